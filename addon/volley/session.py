@@ -75,6 +75,7 @@ class Session:
         time_limit = scene.volley.time_limit if is_limited else 0.0
         with job.timed("sync"):
             views = self._synchronise(engine, depsgraph, frame, shutter, view_names)
+        view_layer = depsgraph.view_layer_eval  # another where a marker within the shutter switches the camera
         for view_name, keys in views:
             self._sync.set_camera(keys, shutter)
             with job.timed("build"):
@@ -124,7 +125,7 @@ class Session:
                         needs_uv=depsgraph.view_layer_eval.use_pass_uv,
                         aovs=passes.aov_numbers(depsgraph.view_layer_eval),
                         light_groups=passes.light_group_numbers(depsgraph.view_layer_eval))
-        cameras = CameraMotion(engine, frame, shutter, view_names, self._sync.warnings)
+        cameras = CameraMotion(engine, depsgraph, frame, shutter, view_names, self._sync.warnings)
         try:
             if moved and shutter.frame_at(motion.CENTER) != now:
                 engine.frame_set(*shutter.frame_at(motion.CENTER))
@@ -163,16 +164,18 @@ class Session:
 
 
 class CameraMotion:
-    """The render camera over the shutter, for each stereo view: keys by view name.
+    """The render camera over the shutter, for each stereo view: keys by view name. As in Cycles, that of the frame: a
+    marker that the shutter passes switches to no other.
 
     ``count`` is how many times it wants to be looked at."""
 
-    def __init__(self, engine, frame, shutter, view_names, warnings):
-        self._engine, self._frame, self._warnings = engine, frame, warnings
+    def __init__(self, engine, depsgraph, frame, shutter, view_names, warnings):
+        self._engine, self._depsgraph, self._frame, self._warnings = engine, depsgraph, frame, warnings
         self._view_names = view_names
         self.count = 1
         if engine.camera_override is None:
             raise native.TracerError(abi.StatusCode.ERROR_INVALID_ARGUMENT, "the scene has no camera")
+        self._camera = engine.camera_override.original  # the evaluated one may not outlive a switch
         if shutter is not None:
             self.count = motion.key_count(engine.camera_override)
         self.keys = {}
@@ -182,8 +185,8 @@ class CameraMotion:
         for name in self._view_names:
             if name:
                 self._engine.active_view_set(name)
-            keys = camera.render_camera(self._engine, self._engine.camera_override, self._frame,
-                                        self._warnings)
+            evaluated = self._camera.evaluated_get(self._depsgraph)
+            keys = camera.render_camera(self._engine, evaluated, self._frame, self._warnings)
             if name not in self.keys:
                 keys.transforms *= self.count
                 keys.windows *= self.count

@@ -218,6 +218,37 @@ def test_zooms_blur(blender):
     assert np.abs(blurred - expected).max() < 5.0 * 0.5 / np.sqrt(256 * 8)
 
 
+# Cuts to another camera ----------------------------------------------------------------------------
+
+def inside_cuts(position):
+    """Frames of a checkered wall around a marker that switches to a camera farther away, while all cameras turn: of
+    Volley and of Cycles, with the shutter open for a frame that is so much before or after."""
+    import scenes
+    scene = scenes.empty(size=(48, 32))
+    scenes.wall(size=6.0, material=scenes.material("Checks", "ShaderNodeTexChecker", Scale=3.0))
+    for frame, y in ((1, -6.0), (2, -12.0), (3, -6.0)):
+        made = scenes.camera(location=(0.0, y, 0.0))
+        for when, angle in ((1, -0.2), (3, 0.2)):
+            made.rotation_euler.z = angle
+            made.keyframe_insert("rotation_euler", frame=when)
+        scene.timeline_markers.new("Cut", frame=frame).camera = made
+    scenes.set_shutter(scene, position, 1.0)
+    pictures = []
+    for frame in (1, 2, 3):
+        scene.frame_set(frame)
+        pictures.append(scenes.seeds_by_both(64 * len(scenes.SEEDS)))
+    return pictures
+
+
+@pytest.mark.parametrize("position", ('START', 'CENTER', 'END'))
+def test_cuts_count_from_frame_to_frame(blender, position):
+    """Shutters that looked through both cameras were off by 6 to 33 % of the mean."""
+    for ours, theirs in blender.run(inside_cuts, position):
+        scale = theirs[..., :3].mean()
+        beyond, tile = compare.unexplained(ours[..., :3], theirs[..., :3])
+        assert beyond < 0.005 * scale and tile < 0.02 * scale
+
+
 # A camera that its parent shears -------------------------------------------------------------------
 
 def _sheared_camera():
