@@ -46,6 +46,8 @@ CASES = {
     "maker of a blocker": ("AREA POINT", "diffuse", "+Made", "-Maker"),
     "maker against object": ("AREA POINT", "diffuse", "-Maker +Made", ""),
     "instanced light": ("INNER POINT", "diffuse", "+Ball", ""),
+    "instanced light alone": ("ALONE POINT", "diffuse", "+Ball", "-Ball"),
+    "instanced mesh alone": ("ALONE_MESH POINT", "gloss", "-Floor", ""),
     "maker of a light": ("MADE POINT", "diffuse", "+Ball", "-Ball"),
 }
 
@@ -128,9 +130,11 @@ def _build(lights, lobe, receivers, blockers):
             if lamp.type == 'LIGHT':
                 lamp.data.energy *= 0.06
         lamps[:] = lamps[::2]
-    elif lights.startswith(("MADE", "INNER")):
-        inside = _lamp('AREA', (2.0, -2.0, 4.0))
+    elif lights.startswith(("MADE", "INNER", "ALONE")):
+        inside = _lamp('MESH' if "MESH" in lights else 'AREA', (2.0, -2.0, 4.0))
         maker = _instance("Maker", inside, (-3.0, 0.0, 0.0))
+        if lights.startswith("ALONE"):  # what is there by the instance alone
+            scene.collection.objects.unlink(inside)
         lamps = [maker if lights.startswith("MADE") else inside]
         _lamp('POINT', (-2.5, -1.5, 3.0))
     else:

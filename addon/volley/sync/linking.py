@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 import bpy
 
+from .source import objects_of
+
 _HAS_LINKING = "light_linking" in bpy.types.Object.bl_rna.properties
 _SET_MAX = 64  # of the bits of a mask
 
@@ -90,7 +92,7 @@ class Links:
 
     def __init__(self, depsgraph, warnings):
         self._collections = {}  # name of object -> its collections, of those that have some
-        for each in depsgraph.objects if _HAS_LINKING else ():
+        for each in objects_of(depsgraph) if _HAS_LINKING else ():
             collections = _collections_of(each)
             if any(collections):
                 self._collections[each.name_full] = collections

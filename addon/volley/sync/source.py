@@ -12,6 +12,11 @@ class Cancelled(Exception):
     """The user stopped the sync."""
 
 
+def objects_of(depsgraph):
+    """All evaluated objects. depsgraph.objects lacks those that are there by instances of their collection alone."""
+    return (each for each in depsgraph.ids if isinstance(each, bpy.types.Object))
+
+
 _FEW = 8  # names that are looked up before it is worth to have all of them in a table
 
 

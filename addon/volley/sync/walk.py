@@ -11,7 +11,7 @@ from .changes import Changes
 from .kept import Circumstances, Kept
 from .linking import Links
 from .matrix import rows
-from .source import Cancelled
+from .source import Cancelled, objects_of
 
 _BREAK_INTERVAL = 32  # instances between two looks at whether the user pressed Esc
 
@@ -363,7 +363,7 @@ class Walk:
     def _find_tangents(self):
         """{pointer of a mesh: names of the tangents that the materials of its objects read}"""
         found = {}
-        for each in self._source.depsgraph.objects:
+        for each in objects_of(self._source.depsgraph):
             if each.data is not None:
                 names = found.setdefault(each.data.as_pointer(), set())
                 for material in filter(None, materials_of(each, self._view_layer)):
