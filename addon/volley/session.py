@@ -114,7 +114,7 @@ class Session:
         """Send everything but the camera; the cameras come back, one for each view."""
         engine.update_stats("", "Reading the scene")
         scene = depsgraph.scene_eval
-        now = motion.split_frame(scene.frame_current_final)
+        now = motion.split_frame(motion.frame_of(scene))
         moved = shutter is not None
         shown = depsgraph.as_pointer(), scene.name_full, depsgraph.view_layer_eval.name
         is_same = self._synchronised == shown

@@ -473,6 +473,33 @@ def test_shutter(blender):
         assert rows[0].mean() == pytest.approx(rows[1].mean(), abs=slack * 4e-4), shape
 
 
+def inside_remapped():
+    """A wall that moves while time is stretched to twice its length, by both engines, and the frame that the scene is
+    at in the end."""
+    import scenes
+    scene = scenes.empty(size=(64, 16))
+    scenes.camera(type='ORTHO', ortho_scale=4.0)
+    moving = scenes.wall("Wall", 1.0, 0.0, material=scenes.emitter((1.0, 1.0, 1.0)))
+    for frame, x in ((0, -2.0), (8, 6.0)):
+        moving.location.x = x
+        moving.keyframe_insert("location", frame=frame)
+    for key in scenes.curves(moving)[0].keyframe_points:
+        key.interpolation = 'LINEAR'
+    scene.render.frame_map_old, scene.render.frame_map_new = 100, 200
+    scenes.set_shutter(scene, length=1.0)
+    scene.frame_set(4)
+    pictures = _seeds()
+    return pictures, scene.frame_current
+
+
+def test_blur_of_remapped_time(blender):
+    """Mapped twice, frame 4 showed the scene of 1 instead of 2, and was written by the name of 2."""
+    pictures, frame = blender.run(inside_remapped)
+    assert frame == 4
+    assert pictures[1][..., :3].max() > 0.5
+    _close(*pictures, "remapped")
+
+
 def inside_turning():
     """A shining bar that makes a third of a turn while it grows, before a camera that rolls; by Volley once
     more, flat along the axis that it has no extent in."""

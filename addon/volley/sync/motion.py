@@ -44,6 +44,11 @@ class Shutter:
         return split_frame(self.center + (fraction - CENTER) * self.length)
 
 
+def frame_of(scene):
+    """The frame that a scene is at, with its rest, as Blender wants it: Time Remapping comes after."""
+    return scene.frame_current + scene.frame_subframe
+
+
 def split_frame(frame):
     """A frame as Blender wants it: whole and rest."""
     whole = math.floor(frame)
@@ -55,7 +60,7 @@ def shutter_of(scene, view_layer, position, wants_vector=False):
     'END' of the interval is the current frame; wants_vector: whether motion matters without blur."""
     render = scene.render
     is_used = render.use_motion_blur and view_layer.use_motion_blur
-    now = scene.frame_current_final
+    now = frame_of(scene)
     if not is_used or render.motion_blur_shutter <= 0.0:
         # From the frame before to the one after.
         return Shutter(2.0, now, None) if wants_vector else None
