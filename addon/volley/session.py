@@ -194,8 +194,9 @@ class CameraMotion:
                 continue
             index = motion.key_index(fraction, self.count)
             if index is not None:
-                self.keys[name].transforms[index] = keys.transforms[0]
-                self.keys[name].windows[index] = keys.windows[0]
+                centre = self.keys[name]
+                centre.transforms[index] = keys.transforms[0]
+                centre.windows[index] = camera.zoomed_window(centre.windows[self.count // 2], centre.lens, keys.lens)
 
 
 class _Run:

@@ -77,18 +77,32 @@ def _fitted_sensor_mm(lens):
     return lens.sensor_height_mm if lens.sensor_fit == 'VERTICAL' else lens.sensor_width_mm
 
 
+def _width_at_one(lens):
+    """The width, or height, that a perspective lens has on its sensor, at a distance of 1."""
+    return _fitted_sensor_mm(lens) / lens.focal_mm
+
+
 def window(lens, frame, offset=(0.0, 0.0)):
     """left, right, bottom, top of the view window of a plane camera, of panoramas as if they were one;
     offset: in frame widths and heights."""
     pixel_aspect = frame.aspect_y / frame.aspect_x
     fitted_px = frame.width if _fits_width(lens, frame) else frame.height * pixel_aspect
-    size = lens.ortho_scale if lens.is_ortho else _fitted_sensor_mm(lens) / lens.focal_mm
+    size = lens.ortho_scale if lens.is_ortho else _width_at_one(lens)
     scale = size * lens.zoom / fitted_px
     center_x = lens.shift[0] * fitted_px + offset[0] * frame.width
     center_y = lens.shift[1] * fitted_px + offset[1] * frame.height
     half_x, half_y = 0.5 * frame.width, 0.5 * frame.height * pixel_aspect
     return ((center_x - half_x) * scale, (center_x + half_x) * scale,
             (center_y - half_y) * scale, (center_y + half_y) * scale)
+
+
+def zoomed_window(shown, lens, other):
+    """The window that shown, of a lens, becomes as the lens turns into another within the shutter. As in Cycles,
+    perspective lenses alone zoom, and none shifts."""
+    if lens.is_ortho or lens.panorama:
+        return shown
+    factor = _width_at_one(other) / _width_at_one(lens)
+    return tuple(factor * edge for edge in shown)
 
 
 def panorama_window(lens, seen, whole):
