@@ -500,6 +500,29 @@ def test_blur_of_remapped_time(blender):
     _close(*pictures, "remapped")
 
 
+def inside_dawn(start):
+    """An even world that brightens, by both engines; start: of the time of the keys."""
+    import scenes
+    scene = scenes.empty(size=(16, 16))
+    scenes.camera()
+    scenes.light_world((1.0, 1.0, 1.0))
+    tree = scene.world.node_tree
+    strength = next(node for node in tree.nodes if node.type == 'BACKGROUND').inputs["Strength"]
+    for frame, strength.default_value in ((start, 0.0), (start + 2, 2.0)):
+        strength.keyframe_insert("default_value", frame=frame)
+    scenes.set_shutter(scene, length=1.0)
+    scene.frame_set(1)
+    return _seeds()
+
+
+@pytest.mark.parametrize("start", (0, 1))
+def test_worlds_are_those_of_the_middle(blender, start):
+    """Those of the end were brighter by .69, and by .31 where they begin to brighten."""
+    ours, theirs = blender.run(inside_dawn, start)
+    assert theirs[..., :3].mean() == pytest.approx(1.0 - start, abs=1e-3)
+    _close(ours, theirs, "dawn")
+
+
 def inside_turning():
     """A shining bar that makes a third of a turn while it grows, before a camera that rolls; by Volley once
     more, flat along the axis that it has no extent in."""

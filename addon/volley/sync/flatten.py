@@ -81,6 +81,11 @@ class FlatTree:
         return any(all(_may_exceed_zero(node.inputs[input_number(node.type, name)]) for name in _EMISSIONS[node.type])
                    for node in self.nodes if node.type in _EMISSIONS)
 
+    def ask_nothing(self):
+        """Have no mesh and no instance bring anything: lights and worlds are read without."""
+        self.uv_names, self.color_names, self.instance_attributes = set(), set(), set()
+        self.needs_generated = self.needs_instancer = False
+
     def signature(self):
         """Equal for trees that mean the same."""
         return self.surface, self.film_colors, tuple(node.signature() for node in self.nodes)

@@ -153,6 +153,7 @@ class Materials:
             flat = self._flatten(world, label, FixedAttributes(self._attributes))
         else:
             flat = _background(world.color)
+        flat.ask_nothing()
         self._update(key, flat)
         entry = self._entries[key]
         return entry.id, entry.sun
@@ -171,8 +172,7 @@ class Materials:
             if flat.instance_attributes:
                 key = own
             flat.follows_scene |= is_made
-            flat.uv_names, flat.color_names, flat.instance_attributes = set(), set(), set()  # nobody has to bring them
-            flat.needs_generated = flat.needs_instancer = False
+            flat.ask_nothing()
             self._lights.add(key)
             self._update(key, flat)
         key = key if key in self._lights else own

@@ -71,6 +71,7 @@ class SceneSync:
         self._materials.begin(source.depsgraph, source.changes, source.aovs)
         self._meshes.begin()
         self._sync_materials(source)
+        self._sync_world(source)  # as materials, at the shutter's middle
         told = self.warnings.count()
         walk = Walk(self, source, shutter, former and former.links_now(source))
         walk.run(former)
@@ -83,7 +84,6 @@ class SceneSync:
         self._instances.update(walk.items.values(), self._meshes.ids(), in_world, self._materials.moving())
         self._lights.update(walk.lights)
         messages += self.warnings.after(told)
-        self._sync_world(source)
         self._meshes.end()
         self._materials.end()
         self._images.end()
