@@ -322,6 +322,11 @@ static vvec3 mean_fresnel(const struct trc_lobe *lobe, uint32_t pass_flags) {
     return reflects ? reflected : v3_sub(v3_splat(vf_one()), reflected);
 }
 
+/* What Cycles' closure weighs, without the energy of further bounces that a weight has here. */
+static vvec3 closure_weight(const struct trc_lobe *lobe) {
+    return lobe->is_whole_glass ? lobe->f0 : v3_scale(lobe->weight, lobe->albedo_scale);
+}
+
 void trc_bsdf_albedo(const struct trc_lobes *l, uint32_t pass_flags, vvec3 albedo_out[3]) {
     for (int k = 0; k < 3; k++)
         albedo_out[k] = v3_zero();
@@ -330,7 +335,7 @@ void trc_bsdf_albedo(const struct trc_lobes *l, uint32_t pass_flags, vvec3 albed
         if (lobe->kind == TRC_LOBE_TRANSPARENT)
             continue;
         const int k = is_transmissive(lobe, true) ? 2 : is_glossy(l, lobe, true);
-        vvec3 albedo = v3_scale(lobe->weight, lobe->albedo_scale);
+        vvec3 albedo = closure_weight(lobe);
         if (lobe->correlated)
             albedo = v3_mul(albedo, mean_fresnel(lobe, pass_flags));
         albedo_out[k] = v3_add(albedo_out[k], albedo);
@@ -343,17 +348,16 @@ static vvec3 normal_of(const struct trc_lobe *lobe, const struct trc_surface *s)
     return lobe->model->normal ? lobe->model->normal(lobe, s->wo) : lobe->n;
 }
 
-/* How much a lobe's normal counts beside those of others: as much as Cycles' closure weighs,
- * without the energy of further bounces that a weight has here. Glass is one closure: of its two
- * lobes the refracting one, which follows, counts. */
+/* How much a lobe's normal counts beside those of others. Glass is one closure: of its two lobes
+ * the refracting one, which follows, counts. */
 static vfloat normal_weight(const struct trc_lobes *l, int i) {
     const struct trc_lobe *lobe = &l->lobe[i], *next = i + 1 < l->count ? lobe + 1 : lobe;
     const bool is_half = lobe->kind == TRC_LOBE_REFLECT && next->kind == TRC_LOBE_REFRACT &&
                          next->fresnel != TRC_FRESNEL_NONE;
     if (is_half)
         return vf_zero();
-    const vfloat scale = lobe->albedo_scale; /* 0: it has no colour in passes, but its normal */
-    return v3_average(lobe->weight) * vf_select(vf_gt(scale, vf_zero()), scale, vf_one());
+    const vfloat mean = v3_average(closure_weight(lobe)); /* 0: no colour in passes, but a normal */
+    return vf_select(vf_gt(mean, vf_zero()), mean, v3_average(lobe->weight));
 }
 
 vvec3 trc_lobes_normal(const struct trc_lobes *l, const struct trc_surface *s) {
@@ -374,8 +378,10 @@ vfloat trc_lobe_alpha(const struct trc_lobe *lobe) {
 }
 
 vvec3 trc_lobe_albedo(const struct trc_lobe *lobe, vvec3 wo, uint32_t pass_flags) {
-    const vvec3 albedo = v3_scale(lobe->weight, lobe->albedo_scale);
-    if (trc_lobe_ends(lobe->kind) || lobe->kind == TRC_LOBE_TRANSLUCENT)
+    const vvec3 albedo = closure_weight(lobe);
+    if (lobe->model->mean)
+        return v3_scale(albedo, lobe->model->mean(lobe));
+    if (trc_lobe_ends(lobe->kind) || lobe->kind == TRC_LOBE_TRANSLUCENT || lobe->is_whole_glass)
         return albedo;
     return v3_mul(albedo, lobe->correlated ? mean_fresnel(lobe, pass_flags)
                                            : facet_fresnel(lobe, v3_dot(lobe->n, wo)));

@@ -68,8 +68,9 @@ struct trc_lobe {
                           a film: its thickness */
     /* Toon, f0: angle of full light, angle of its fading, cosine of both. Fibres, f0: the two
      * coefficients of their transform. Oren-Nayar that keeps energy, f0: factor of the part that
-     * scatters more than once. Portals: where the ray goes on, and its
-     * direction. Fibres: kernels/lobe/hair.c and principled_hair.c. */
+     * scatters more than once. Whole glass, f0: albedo in passes, in one of both lobes. Portals:
+     * where the ray goes on, and its direction. Fibres: kernels/lobe/hair.c and principled_hair.c.
+     */
     vvec3 f0, f90;
     vfloat cos_o;         /* n . wo */
     vfloat g1_o;          /* masking of wo */

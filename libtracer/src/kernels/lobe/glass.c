@@ -103,7 +103,7 @@ static vfloat kept_by_glass(vfloat albedo, vfloat eta) {
 #define MAX_SHARE 0.95f
 
 void trc_add_multi_glass(struct trc_setup *c, vvec3 weight, vvec3 reflected, vvec3 refracted,
-                         vvec3 n, vfloat alpha, vfloat eta) {
+                         vvec3 albedo, vvec3 n, vfloat alpha, vfloat eta) {
     /* As rough as the lobes will be: a filtered one keeps its energy too. */
     const vfloat rough = vf_max(vf_clamp(alpha, MIN_ALPHA, 1.0f), c->filter_alpha);
     const vfloat kept = kept_by_glass(trc_glass_albedo(v3_dot(n, c->s->wo), rough, eta), eta);
@@ -118,20 +118,22 @@ void trc_add_multi_glass(struct trc_setup *c, vvec3 weight, vvec3 reflected, vve
     const vvec3 w = v3_mul(weight, gain);
     struct trc_lobe *reflect = trc_add_dielectric(c, TRC_LOBE_REFLECT, v3_mul(w, reflected), n,
                                                   rough, eta, TRC_DISTRIBUTION_GGX);
-    /* To the passes of colours all of it is transmission, and bounces between facets add nothing:
-     * Cycles 3.4. */
+    /* To the passes of colours and of features all of it is one transmission, and bounces between
+     * facets add nothing: Cycles 3.4. */
     if (reflect) {
         reflect->fresnel = TRC_FRESNEL_DIELECTRIC;
-        reflect->albedo_scale = vf_zero();
         reflect->is_whole_glass = true;
+        reflect->f0 = v3_zero();
     }
     struct trc_lobe *refract = trc_add_dielectric(c, TRC_LOBE_REFRACT, v3_mul(w, refracted), n,
                                                   rough, eta, TRC_DISTRIBUTION_GGX);
     if (refract) {
         refract->fresnel = TRC_FRESNEL_DIELECTRIC;
-        refract->albedo_scale = vf_rcp(v3_average(gain));
         refract->is_whole_glass = true;
     }
+    struct trc_lobe *seen = refract ? refract : reflect; /* black glass reflects alone */
+    if (seen)
+        seen->f0 = albedo;
     c->out->rare |= TRC_LOBES_WHOLE_GLASS;
     share_chances(reflect, refract, trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta));
 }
@@ -212,7 +214,8 @@ static void add_glass(struct trc_setup *c, const struct trc_leaf *leaf, vfloat w
     }
     if (leaf->mode == TRC_DISTRIBUTION_MULTI_GGX) {
         const vvec3 tint = v3_saturate(color);
-        trc_add_multi_glass(c, v3_splat(weight), tint, tint, n, alpha, eta);
+        trc_add_multi_glass(c, v3_splat(weight), tint, tint, v3_scale(color, weight), n, alpha,
+                            eta);
         return;
     }
     const vvec3 tint = v3_scale(color, weight);

@@ -41,6 +41,9 @@ struct trc_lobe_model {
     bool is_strand;  /* denoisers go by its tangent, not its normal */
     /* What the passes of normals have for n. NULL: n. */
     vvec3 (*normal)(const struct trc_lobe *lobe, vvec3 wo);
+    /* The part of its weight that denoisers take for its albedo; of lobes without a Fresnel factor.
+     * NULL: all. */
+    vfloat (*mean)(const struct trc_lobe *lobe);
     /* Of TRC_LOBE_TRANSPARENT: the ray goes on from f0, in the direction f90, which is unit. */
     bool is_portal;
     /* Towards wi; lanes of the wrong side are dropped by the caller. NULL: straight through. */
@@ -201,9 +204,9 @@ struct trc_thin_glass {
 void trc_add_thin_glass(struct trc_setup *c, const struct trc_thin_glass *glass);
 
 /* Multiple-scattering glass: both lobes with the factor of the micro-normal, scaled so that they
- * keep all energy together. reflected, refracted: colours of the lobes. */
+ * keep all energy together. reflected, refracted: colours of the lobes; albedo: that of passes. */
 void trc_add_multi_glass(struct trc_setup *c, vvec3 weight, vvec3 reflected, vvec3 refracted,
-                         vvec3 n, vfloat alpha, vfloat eta);
+                         vvec3 albedo, vvec3 n, vfloat alpha, vfloat eta);
 /* Glass of Cycles 4: both lobes with the factor of the micro-normal. reflected, refracted: their
  * colours. */
 void trc_add_correlated_glass(struct trc_setup *c, vvec3 weight, vvec3 reflected, vvec3 refracted,

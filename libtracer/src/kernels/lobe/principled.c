@@ -94,7 +94,7 @@ static void principled_glass(struct trc_setup *c, const struct trc_leaf *leaf, v
         vm_any(vm_and(c->s->active, vf_gt(roughness, vf_set(MULTIPLE_GLASS_FROM))))) {
         const vfloat blend = trc_fresnel_blend(v3_dot(n, c->s->wo), eta);
         trc_add_multi_glass(c, glass, v3_lerp(f0, v3_splat(vf_one()), vf_saturate(blend)),
-                            v3_saturate(base), n, alpha, eta);
+                            v3_saturate(base), glass, n, alpha, eta);
         return;
     }
     const vfloat f = trc_reflected_part(trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta));

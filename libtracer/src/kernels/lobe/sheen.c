@@ -15,13 +15,18 @@ static struct lobe_value schlick_value(const struct trc_lobe *lobe, const struct
                       cosine_density(cos_i));
 }
 
+/* Taken at the normal, as if that were every half vector: Cycles. */
+static vfloat schlick_mean(const struct trc_lobe *lobe) {
+    return vf_max(trc_schlick_weight(lobe->cos_o) * lobe->cos_o, vf_zero());
+}
+
 void trc_add_schlick_sheen(struct trc_setup *c, vvec3 weight, vvec3 n) {
-    static const struct trc_lobe_model model = {.kind = TRC_LOBE_DIFFUSE, .value = schlick_value};
+    static const struct trc_lobe_model model = {
+        .kind = TRC_LOBE_DIFFUSE, .value = schlick_value, .mean = schlick_mean};
     struct trc_lobe *lobe = trc_add_matt(c, &model, weight, n, vf_zero());
     if (!lobe)
         return;
-    const vfloat mean = trc_schlick_weight(lobe->cos_o) * lobe->cos_o;
-    lobe->mix_weight = lobe->mix_weight * vf_max(mean, vf_zero());
+    lobe->mix_weight = lobe->mix_weight * schlick_mean(lobe);
 }
 
 /* ---- microfibres ---- */
