@@ -94,7 +94,8 @@ def draw_inputs(node, rng):
             socket.default_value = (*value[:3], 1.0)
         elif socket.type == 'VALUE':
             low, high = {"IOR": (1.05, 2.0), "Roughness": (0.05, 1.0), "Scale": (1.0, 8.0), "Detail": (0.0, 4.0),
-                         "Strength": (0.2, 1.0), "Smoothness": (0.01, 1.0)}.get(socket.name, (0.0, 1.0))
+                         "Strength": (0.2, 1.0), "Smoothness": (0.01, 1.0),
+                         "Exponent": (0.3, 1.0)}.get(socket.name, (0.0, 1.0))  # with less Cycles' Voronoi ends in NaN
             socket.default_value = low + (high - low) * value[0]
 
 
@@ -436,7 +437,10 @@ def draw_lamp_nodes(scene, data):
         falloff = tree.nodes.new("ShaderNodeLightFalloff")
         falloff.inputs["Strength"].default_value = 1.0
         falloff.inputs["Smooth"].default_value = rng.choice((0.0, 1.0))
-        tree.links.new(falloff.outputs[rng.choice((0, 1))], emission.inputs["Strength"])
+        output = rng.choice((0, 1))
+        if data.type == 'SUN':  # Linear is endless light there, before Blender 5
+            output = 0
+        tree.links.new(falloff.outputs[output], emission.inputs["Strength"])
 
 
 def set_world(scene, rng):
