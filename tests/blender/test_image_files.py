@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Images of several files, limited ones and projected ones against Cycles'."""
 
+import itertools
+import os
+
 import numpy as np
 import pytest
 
@@ -46,7 +49,6 @@ def _both(samples=1):
 
 def inside_tiles(is_packed):
     """Three of four tiles, of different sizes, by UDIM numbers; packed: and their files are gone."""
-    import os
     import shutil
     import tempfile
     import bpy
@@ -71,7 +73,6 @@ def inside_tiles(is_packed):
 
 def inside_projections():
     """A turned sphere that shows an image in every projection over its generated coordinates."""
-    import os
     import tempfile
     import bpy
     import scenes
@@ -110,7 +111,6 @@ def test_tiles(blender, is_packed):
 
 def _noise_file(width):
     """An image from a file of noise."""
-    import os
     import tempfile
     import bpy
     path = os.path.join(tempfile.mkdtemp(prefix="volley_"), "large.png")
@@ -141,7 +141,6 @@ def test_limit(blender):
 
 def inside_rewritten():
     """[Volley's, Cycles'] of a file, and of what another program has made of it, in one session."""
-    import os
     import tempfile
     import bpy
     import scenes
@@ -227,9 +226,84 @@ def test_projections(blender):
     assert np.abs(pictures['BOX', 0.4][1] - pictures['BOX', 0.0][1]).max() > 0.02
 
 
+# name: (file format and channels, or None for Blender's own pixels; bits; whether it is packed)
+ALPHA_SOURCES = {
+    "packed PNG": (('PNG', 'RGBA'), 8, True), "packed PNG of 16 bits": (('PNG', 'RGBA'), 16, True),
+    "packed half floats": (('OPEN_EXR', 'RGBA'), 16, True), "packed floats": (('OPEN_EXR', 'RGBA'), 32, True),
+    "packed JPEG": (('JPEG', 'RGB'), 8, True), "packed WebP": (('WEBP', 'RGBA'), 8, True),
+    "packed TIFF": (('TIFF', 'RGBA'), 16, True), "TIFF": (('TIFF', 'RGBA'), 16, False),
+    "bytes": (None, 8, False), "floats": (None, 32, False),
+    "packed bytes": (None, 8, True), "packed floats of Blender": (None, 32, True),
+}
+ALPHA_CASES = list(itertools.product(
+    ('STRAIGHT', 'PREMUL', 'CHANNEL_PACKED', 'NONE'), ("sRGB", "Non-Color"), ("Color", "Alpha")))
+ALPHA_GRID, ALPHA_SIDE = 4, 8  # panels, and pixels of one, along each side of the picture
+
+
+def _alpha_image(source, space, mode, folder):
+    """Colours that are above their alpha as often as not."""
+    import bpy
+    kind, bits, is_packed = ALPHA_SOURCES[source]
+    made = bpy.data.images.new(source, ALPHA_SIDE, ALPHA_SIDE, alpha=True, float_buffer=kind is not None or bits > 8)
+    # Before there are pixels, which these would make anew.
+    made.colorspace_settings.name, made.alpha_mode = ("Non-Color", 'CHANNEL_PACKED') if kind else (space, mode)
+    pixels = np.random.default_rng(3).uniform(0.05, 0.95, 4 * ALPHA_SIDE ** 2).astype(np.float32)
+    made.pixels.foreach_set(pixels)
+    made.update()
+    if kind:
+        settings = bpy.context.scene.render.image_settings
+        settings.file_format, settings.color_mode = kind
+        if kind[0] not in ('JPEG', 'WEBP'):
+            settings.color_depth = str(bits)
+        path = os.path.join(folder, source)
+        made.save_render(path)
+        made = bpy.data.images.load(path)
+        made.colorspace_settings.name, made.alpha_mode = space, mode
+    if is_packed:
+        made.pack()
+    return made
+
+
+def inside_alpha(source):
+    """{case: [picture by Volley, by Cycles]} of an image in every alpha mode, as data and as colours, shown as it
+    is and dimmed by its alpha."""
+    import tempfile
+    import bpy
+    import scenes
+    scene = scenes.empty(size=(ALPHA_GRID * ALPHA_SIDE,) * 2, samples=1)
+    scenes.camera(type='ORTHO', ortho_scale=ALPHA_GRID)
+    scenes.sharpen()
+    folder = tempfile.mkdtemp(prefix="volley_")
+    for number, (mode, space, output) in enumerate(ALPHA_CASES):
+        center = [part - 0.5 * (ALPHA_GRID - 1) for part in (number % ALPHA_GRID, number // ALPHA_GRID)]
+        tree = scenes.wall(f"Wall{number}", 1.0, center=center,
+                           material=scenes.emitter((1.0, 1.0, 1.0))).data.materials[0].node_tree
+        node, emission = tree.nodes.new("ShaderNodeTexImage"), tree.nodes["Emission"]
+        node.image, node.interpolation = _alpha_image(source, space, mode, folder), 'Closest'
+        tree.links.new(node.outputs["Color"], emission.inputs["Color"])
+        if output == "Alpha":
+            tree.links.new(node.outputs["Alpha"], emission.inputs["Strength"])
+    settings = bpy.context.scene.render.image_settings
+    settings.file_format, settings.color_mode, settings.color_depth = 'OPEN_EXR', 'RGBA', '32'
+    pictures, found = _both(), {}
+    for number, case in enumerate(ALPHA_CASES):
+        x, y = number % ALPHA_GRID * ALPHA_SIDE, number // ALPHA_GRID * ALPHA_SIDE
+        found[case] = [picture[y:y + ALPHA_SIDE, x:x + ALPHA_SIDE] for picture in pictures]
+    return found
+
+
+@pytest.mark.parametrize("source", ALPHA_SOURCES)
+def test_alpha_modes(blender, source):
+    """Read as files, packed PNGs that are said to be multiplied by alpha were .24 off in a channel, packed floats that
+    are said not to be .69; and colours above their alpha had the error of a polynomial out of its range, hundreds."""
+    for case, (ours, theirs) in blender.run(inside_alpha, source).items():
+        assert theirs.std() > 0.02, case
+        error = np.abs(ours - theirs) / np.maximum(theirs.max(axis=-1, keepdims=True), 1.0)
+        assert error.max() <= 3e-3, (case, error.max())  # half floats, which Cycles rounds towards 0
+
+
 def inside_opened():
     """Processes that opening files starts: one of Cycles with an image, one of Volley without, one with."""
-    import os
     import tempfile
     import bpy
     import processes

@@ -180,6 +180,15 @@ TRC_INLINE vfloat srgb_decode(vfloat x) {
     return vf_select(vf_lt(x, vf_set(0.04045f)), low, vf_pow(base, vf_set(2.4f)));
 }
 
+/* Colours divided by alpha are above 1 where the image has more than its alpha; the rest of them are
+ * not by more than rounding. */
+#define UNIT_LIMIT 1.001f
+TRC_INLINE vfloat srgb_decode_divided(vfloat x, vmask lanes) {
+    const vfloat unit = srgb_decode_unit(x);
+    const vmask above = vf_gt(x, vf_set(UNIT_LIMIT));
+    return vm_any(vm_and(above, lanes)) ? vf_select(above, srgb_decode(x), unit) : unit;
+}
+
 /* RGBA of an image itself. mode: as TRC_OP_IMAGE. */
 static void whole_lookup(const struct trc_image *image, uint32_t mode, vfloat u, vfloat v,
                          vmask lanes, vfloat out[4]) {
@@ -203,15 +212,20 @@ static void whole_lookup(const struct trc_image *image, uint32_t mode, vfloat u,
         for (int c = 0; c < 4; c++)
             out[c] = out[c] * scale;
     }
-    if ((mode & TRC_IMAGE_MODE_ALPHA) && image->is_associated) {
+    const bool is_divided = (mode & TRC_IMAGE_MODE_ALPHA) && image->is_associated;
+    if (is_divided) {
         const vfloat inverse = vf_select(vf_ne(out[3], vf_zero()), vf_rcp(out[3]), vf_one());
         for (int c = 0; c < 3; c++)
             out[c] = out[c] * inverse;
     }
     if (!image->is_srgb)
         return;
-    for (int c = 0; c < 3; c++)
-        out[c] = is_integer ? srgb_decode_unit(out[c]) : srgb_decode(out[c]);
+    for (int c = 0; c < 3; c++) {
+        if (!is_integer)
+            out[c] = srgb_decode(out[c]);
+        else
+            out[c] = is_divided ? srgb_decode_divided(out[c], lanes) : srgb_decode_unit(out[c]);
+    }
 }
 
 /* The smallest level whose texels are no wider than width, in units of the image's shorter side. */
