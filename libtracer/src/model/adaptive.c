@@ -78,7 +78,7 @@ static void look(struct trc_adaptive_pixel *p, uint32_t samples) {
         total += mean;
         p->mean[c] = mean;
     }
-    const float error = change / (MEAN_EPSILON + sqrtf(fmaxf(total, 0.0f)));
+    const float error = change / (MEAN_EPSILON + sqrtf(fabsf(total)));
     p->variance = error * error * (float)samples;
 }
 

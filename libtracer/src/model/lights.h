@@ -136,7 +136,7 @@ struct trc_world_map {
     float *down;      /* for each block, down each column in turn: sums of its rows, 0 to 1 */
     float *along;     /* for each row, for each block in it: sums of its cells, 0 to 1 */
     float *density;   /* width * height: value over the mean, per unit square */
-    float average[3]; /* mean radiance over the sphere */
+    float average[3]; /* mean magnitude of the radiance over the sphere */
     bool is_even;     /* to rays of no kind it is as bright everywhere */
     struct trc_world_sun sun;
 };

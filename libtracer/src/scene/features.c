@@ -114,7 +114,7 @@ static uint32_t view_features(const struct trc_snapshot *s) {
                     (material_features(has) & (TRC_FEATURE_PROGRAMS | TRC_FEATURE_TEXTURES));
         if (has & TRC_MATERIAL_HAS_TEXTURE)
             features |= TRC_FEATURE_ENVIRONMENT_IMAGE;
-    } else if (radiance[0] > 0.0f || radiance[1] > 0.0f || radiance[2] > 0.0f) {
+    } else if (radiance[0] != 0.0f || radiance[1] != 0.0f || radiance[2] != 0.0f) {
         features |= TRC_FEATURE_ENVIRONMENT;
     }
     return features;

@@ -6,6 +6,7 @@
 #include "core/pool.h"
 #include "model/kernels.h"
 #include "shading/lights.h"
+#include "shading/vectors.h"
 
 #define PI 3.14159265358979f
 
@@ -73,7 +74,7 @@ static void weigh_sun(const struct trc_snapshot *s, struct trc_world_map *map) {
     const float part = 0.25f * sun->square_chord;
     float mean[3] = {0};
     for (int k = 0; k < 3 * SUN_RINGS * SUN_TURNS; k++)
-        mean[k % 3] += fmaxf(radiance[k], 0.0f) * (part / (SUN_RINGS * SUN_TURNS));
+        mean[k % 3] += fabsf(radiance[k]) * (part / (SUN_RINGS * SUN_TURNS));
     const float light = trc_luminance(mean), sky = trc_luminance(map->average);
     if (!(light > 0.0f && light < 1e30f))
         return;
@@ -131,10 +132,10 @@ static void measure_row(void *context, uint32_t row, uint32_t worker) {
         for (uint32_t k = 0; k < SAMPLES_PER_CELL; k++) {
             const uint32_t at = k / SUBSAMPLES * columns + x * SUBSAMPLES + k % SUBSAMPLES;
             const float *c = radiance + 3 * (size_t)at;
-            const float light = trc_luminance(c);
+            const float light = trc_brightness(c);
             mean += light > 0.0f && light < 1e30f ? light / SAMPLES_PER_CELL : 0.0f;
             for (int i = 0; i < 3; i++)
-                m->sums[row][i] += c[i] > 0.0f && c[i] < 1e30f ? (double)(c[i] * weight) : 0.0;
+                m->sums[row][i] += fabsf(c[i]) < 1e30f ? (double)(fabsf(c[i]) * weight) : 0.0;
         }
         map->density[(size_t)row * map->width + x] = mean * weight;
     }

@@ -28,6 +28,10 @@ static inline float trc_normalize(float a[3], float x, float y, float z) {
     a[2] = z;
     return 0.0f;
 }
-static inline float trc_brightness(const float c[3]) { return fabsf(trc_luminance(c)); }
+/* By magnitudes: what takes light away is chosen as often as what gives as much. */
+static inline float trc_brightness(const float c[3]) {
+    const float magnitude[3] = {fabsf(c[0]), fabsf(c[1]), fabsf(c[2])};
+    return trc_luminance(magnitude);
+}
 
 #endif

@@ -154,7 +154,7 @@ void trc_lamp_measure(const struct trc_snapshot *scene, const struct trc_light_t
         view.distance = place.distance;
         const vfloat weight = place_weight(lamp, &place);
         const vmask lit = vm_and(m, vf_gt(weight, vf_zero()));
-        const vvec3 light = v3_scale(trc_lamp_emission(&view, lit), weight);
+        const vvec3 light = v3_scale(v3_abs(trc_lamp_emission(&view, lit)), weight);
         sums[0] += sum_of(light.x, lit);
         sums[1] += sum_of(light.y, lit);
         sums[2] += sum_of(light.z, lit);

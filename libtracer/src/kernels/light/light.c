@@ -173,14 +173,12 @@ static void sample_world(const struct draw *d, vmask m) {
         trc_world_sample(d->table, d->receiver.n, d->receiver.has_n, d->u1, d->u2, m);
     /* No kind of ray: Cycles evaluates light samples without any either. */
     place.radiance = trc_world_shade(d->scene, place.wi, vu_set(0), m);
-    if (d->table->world_asks_rays) { /* what rays of some kind see must not be lost */
+    if (d->table->world_asks_rays) { /* what rays of some kind see is not lost */
         vvec3 seen[3];
         const vmask behind = vf_lt(v3_dot(d->s->ng, place.wi), vf_zero());
         trc_world_shade_kinds(d->scene, place.wi, behind, m, seen);
         for (int k = 0; k < 3; k++)
-            place.radiance =
-                v3(vf_max(place.radiance.x, seen[k].x), vf_max(place.radiance.y, seen[k].y),
-                   vf_max(place.radiance.z, seen[k].z));
+            place.radiance = v3_add(v3_abs(place.radiance), v3_abs(seen[k]));
     }
     set_place(d, &place, m);
     if (!d->table->world_casts_shadow)

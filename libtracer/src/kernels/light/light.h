@@ -22,7 +22,7 @@ struct trc_light_sample {
                         delta lights so that contribution = radiance * f * cos / pdf */
     vfloat density;  /* of the place, per solid angle; 1 for delta lights */
     vfloat pdf;      /* density, times the chance of having chosen this light */
-    vmask valid;     /* pdf > 0 and radiance > 0 */
+    vmask valid;     /* pdf > 0 and radiance not 0 */
     vmask delta;     /* point light or sun without extent: no MIS */
     vmask no_mis;    /* reflected rays towards wi do not see this light: weight 1 */
     vmask casts_shadow;

@@ -180,8 +180,8 @@ TRC_INLINE vfloat srgb_decode(vfloat x) {
     return vf_select(vf_lt(x, vf_set(0.04045f)), low, vf_pow(base, vf_set(2.4f)));
 }
 
-/* Colours divided by alpha are above 1 where the image has more than its alpha; the rest of them are
- * not by more than rounding. */
+/* Colours divided by alpha are above 1 where the image has more than its alpha; the rest of them
+ * are not by more than rounding. */
 #define UNIT_LIMIT 1.001f
 TRC_INLINE vfloat srgb_decode_divided(vfloat x, vmask lanes) {
     const vfloat unit = srgb_decode_unit(x);

@@ -71,7 +71,7 @@ static void ambient_samples(struct trc_tile *t, const struct arrival *a,
             .light = vi_set(number)};
         const vvec3 light = adds ? white : ambient_world(t, s, lobes, n, sample.wi, active);
         const struct light_result r = {.diffuse = v3_mul(weight, light)};
-        const vfloat size = v3_max(r.diffuse);
+        const vfloat size = v3_max(v3_abs(r.diffuse));
         const vmask lit = vm_and(active, is_light(size));
         if (!vm_any(lit))
             continue;

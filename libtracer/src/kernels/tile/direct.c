@@ -156,7 +156,7 @@ static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
                v3_scale(v3_select(SEEN(TRC_VISIBLE_TRANSMISSION), f.transmission, v3_zero()), mis));
 #undef SEEN
     const vvec3 sum = v3_add(out->diffuse, v3_add(out->glossy, out->transmission));
-    const vfloat size = v3_max(sum);
+    const vfloat size = v3_max(v3_abs(sum)); /* there are lights that take light away */
     return vm_and(active, is_light(size));
 }
 
@@ -176,7 +176,8 @@ static vfloat mean_alpha2(const struct trc_lobes *lobes) {
 /* How rough what is lit is, by which Cycles widens rays: the root of the mean square alpha, that of
  * what is matt being 1, by what each brings. Cycles takes the mean by densities. */
 static vfloat spread_of(const struct light_result *r) {
-    const vfloat matt = v3_max(r->diffuse), rest = v3_max(v3_add(r->glossy, r->transmission));
+    const vfloat matt = v3_max(v3_abs(r->diffuse));
+    const vfloat rest = v3_max(v3_abs(v3_add(r->glossy, r->transmission)));
     return vf_sqrt(vf_divide(matt + rest * r->alpha2, matt + rest));
 }
 

@@ -150,7 +150,7 @@ static vvec3 pass_lamps(struct trc_tile *t, const struct arrival *a, vfloat end,
     } else {
         trc_light_hit(t->snapshot, &ray, group, a->active, &c);
     }
-    const vmask seen = vm_and(a->active, vf_gt(v3_max(c), vf_set(0.0f)));
+    const vmask seen = vm_and(a->active, vf_gt(v3_max(v3_abs(c)), vf_set(0.0f)));
     if (!vm_any(seen))
         return v3_zero();
     c = v3_where(seen, v3_mul(a->found_weight, c));

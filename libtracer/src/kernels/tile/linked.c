@@ -16,7 +16,7 @@ static vmask looks_for_lights(const struct arrival *a) {
 static void found_push(struct trc_tile *t, const struct arrival *a, vvec3 radiance, vfloat distance,
                        vint light, vmask casts_shadow, vmask active) {
     vvec3 c = v3_mul(a->found_weight, radiance);
-    active = vm_and(active, is_light(v3_max(c)));
+    active = vm_and(active, is_light(v3_max(v3_abs(c))));
     if (!vm_any(active))
         return;
     if (trc_clamps(t->desc))
