@@ -125,6 +125,7 @@ class LightFlags(IntFlag):
     SYNTHETIC = 4
     LOCAL_UV = 8
     OBJECT = 16
+    CENTERED = 32
 
 
 class AoMethod(IntEnum):

@@ -55,6 +55,9 @@ AREA_LIGHT_POWER = 4.0 / math.pi if bpy.app.version >= (4, 0, 0) else 1.0
 # its axis.
 SPOT_IS_EVEN = bpy.app.version >= (4, 0, 0)
 
+# Rectangles that a parent shears are sampled from their centre, not from their corner; seen in 4.3, not in 3.4.
+SHEARS_FROM_CENTER = bpy.app.version >= (4, 0, 0)
+
 # Nodes of a light have UV coordinates, in the light's own space, and a spot's image spans its cone; seen in
 # 4.3, not in 3.4.
 LIGHT_UV_IS_LOCAL = bpy.app.version >= (4, 0, 0)

@@ -12,6 +12,7 @@ SIZE = (48, 32)
 SEEDS = (21, 22, 23, 24, 25, 26)
 SAMPLES = 64
 TOLERANCE = 0.01  # relative to the mean of the picture
+SHEARED_TOLERANCE = 0.03  # of tiles: rays of matt surfaces, which Cycles has, meet a light elsewhere than samples are
 
 CASES = {}  # name: (kind, settings)
 
@@ -49,6 +50,11 @@ _add('AREA', {**_BESIDE, "size": 1.0, "color": (1.0, 0.3, 0.0), "wall": True}, e
 _add('MESH', _BESIDE, energy=(-5.0,))
 _add('WORLD', {**_BESIDE, "sampling": 'AUTOMATIC'}, power=(-0.2,))
 _add('WORLD', {**_BESIDE, "sampling": 'NONE', "gradient": True}, power=(-0.4,))
+# Sheared by a parent: rectangles were 29 % too dark, ellipses 26 % too bright, spots of Blender 4 56 %.
+_add('AREA', {"energy": 300.0, "size": 1.5, "size_y": 0.7}, shape=('SQUARE', 'RECTANGLE', 'DISK', 'ELLIPSE'),
+     sheared=(True,))
+_add('AREA', {"energy": 300.0, "size": 1.5, "size_y": 0.7, "shape": 'RECTANGLE'}, spread=(1.0,), sheared=(True,))
+_add('SPOT', {"energy": 900.0, "spot_size": 1.0, "shadow_soft_size": 0.4, "spot_blend": 0.3}, sheared=(True,))
 
 
 # Inside Blender ------------------------------------------------------------------------------------
@@ -63,6 +69,7 @@ def _shine(kind, settings):
         scenes.mesh("Wall", [(-4, 2, 0), (4, 2, 0), (4, 2, 6), (-4, 2, 6)], [(0, 1, 2, 3)], gloss)
     if "normalize" in settings and "normalize" not in bpy.types.Light.bl_rna.properties:
         del settings["normalize"]
+    sheared = settings.pop("sheared", False)
     if settings.pop("beside", False):
         scenes.light('AREA', location=(-3.0, -3.0, 4.0), rotation=(0.7, 0.0, -0.785), energy=600.0, size=2.0)
     if kind == 'WORLD':
@@ -76,6 +83,11 @@ def _shine(kind, settings):
     else:
         for number in range(settings.pop("count", 1)):
             lamp = scenes.light(kind, location=(2.0 - 0.1 * number, -2.0, 4.0), rotation=(0.72, 0.0, 0.785), **settings)
+        if sheared:
+            lamp.parent = scenes.link("Parent", None)
+            lamp.parent.location, lamp.parent.rotation_euler = lamp.location, lamp.rotation_euler
+            lamp.parent.scale = (1.0, 2.0, 0.6)
+            lamp.location, lamp.rotation_euler = (0.0, 0.0, 0.0), (0.3, 0.4, 0.6)
         if bounces is not None:
             lamp.data.cycles.max_bounces = bounces
 
@@ -130,6 +142,7 @@ def errors(blender_of_module):
 def test_against_cycles(errors, name):
     _mean, biased, tile = errors[name]
     assert biased < TOLERANCE
+<<<<<<< HEAD
     assert tile < TOLERANCE
 
 
@@ -174,3 +187,6 @@ def test_world_without_shadows(blender):
     for case, (ours, theirs) in blender.run(inside_shadowless).items():
         ours, theirs = ours[..., :3], theirs[..., :3]
         assert all(error <= TOLERANCE * theirs.mean() for error in compare.unexplained(ours, theirs)), case
+=======
+    assert tile < (SHEARED_TOLERANCE if "sheared" in name else TOLERANCE)
+>>>>>>> 266b10b (Lights that parents shear are lit as by Cycles)

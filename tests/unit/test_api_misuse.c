@@ -563,7 +563,7 @@ static void lights(void **state) {
     REFUSE_LIGHT(desc.spread = NAN);
     REFUSE_LIGHT(desc.type = TRC_LIGHT_SPOT; desc.spot_angle = 0.0f);
     REFUSE_LIGHT(desc.type = TRC_LIGHT_SPOT; desc.spot_blend = 1.5f);
-    REFUSE_LIGHT(desc.flags = 2 * TRC_LIGHT_OBJECT);
+    REFUSE_LIGHT(desc.flags = 2 * TRC_LIGHT_CENTERED);
     REFUSE_LIGHT(desc.visibility = 32);
     REFUSE_LIGHT(desc.cast_shadow = 2);
     REFUSE_LIGHT(desc.use_mis = 7);

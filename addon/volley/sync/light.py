@@ -9,7 +9,7 @@ import math
 
 from .. import abi, native
 from ..compat import (AREA_LIGHT_POWER, LIGHT_IS_OBJECT, LIGHT_UV_IS_LOCAL,
-                      SPOT_IS_EVEN, SUN_IS_EVEN, casts_shadow, cycles, is_ball, uses_nodes)
+                      SHEARS_FROM_CENTER, SPOT_IS_EVEN, SUN_IS_EVEN, casts_shadow, cycles, is_ball, uses_nodes)
 from .visibility import light_visibility
 
 
@@ -105,6 +105,7 @@ def _sun(light):
 def _area(light):
     is_square = light.shape in {'SQUARE', 'DISK'}
     return {"size_x": light.size, "size_y": light.size if is_square else light.size_y,
+            "flags": abi.LightFlags.CENTERED if SHEARS_FROM_CENTER else 0,
             "area_shape": abi.AreaShape.RECTANGLE if light.shape in {'SQUARE', 'RECTANGLE'}
             else abi.AreaShape.ELLIPSE,
             "spread": min(max(getattr(light, "spread", math.pi), 1e-4), math.pi)}

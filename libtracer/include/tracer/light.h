@@ -17,7 +17,7 @@ enum trc_light_flags {
     TRC_LIGHT_SPHERE = 1,    /* point, spot: a sphere; else a disk that faces the lit point, as in
                                 Blender before 4.0 and, from 4.1 on, with Soft Falloff */
     TRC_LIGHT_EVEN_CONE = 2, /* spot: as bright all over its cone, which is stretched as the
-                                transform is (without shear); else times the cosine to its axis and
+                                transform is; else times the cosine to its axis and
                                 round, as in Blender before 4.0. Sun: the same radiance all over its
                                 disc, strength the irradiance; else more at the rim and less in all,
                                 as in Blender 3 */
@@ -26,9 +26,11 @@ enum trc_light_flags {
     TRC_LIGHT_LOCAL_UV = 8,  /* its nodes' UV and Parametric are of the light's own space, and a
                                 spot's span its cone, as in Blender 4; else a point's and a spot's
                                 Parametric goes by world directions and UV is 0, as in Blender 3.4 */
-    TRC_LIGHT_OBJECT = 16 /* its nodes have object space: Object and Generated coordinates and the
-                             place of Object Info are the light's, as in Blender 5; else only
-                             normals are turned into it */
+    TRC_LIGHT_OBJECT = 16,  /* its nodes have object space: Object and Generated coordinates and the
+                               place of Object Info are the light's, as in Blender 5; else only
+                               normals are turned into it */
+    TRC_LIGHT_CENTERED = 32 /* area: a rectangle whose transform shears it is sampled from its
+                               centre, as in Blender 4; else from its corner */
 };
 
 /* Strengths are Blender's: watts for point, spot and area, W/m^2 for the sun, times color. A light

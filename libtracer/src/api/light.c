@@ -36,7 +36,7 @@ static trc_status check_light(const trc_light_desc *desc) {
     TRC_TRY(trc_check_count(desc->light_group, 0, TRC_MAX_LIGHT_GROUPS, "light_group"));
     TRC_TRY(trc_check_finite(&desc->random, 1, "random"));
     TRC_TRY(trc_check_finite(desc->object_color, 4, "object_color"));
-    return trc_check_enum(desc->flags, 2 * TRC_LIGHT_OBJECT, "flags");
+    return trc_check_enum(desc->flags, 2 * TRC_LIGHT_CENTERED, "flags");
 }
 
 trc_status trc_light_create(trc_scene scene, const trc_light_desc *desc, trc_id *light_out) {

@@ -24,12 +24,13 @@ enum {
     TRC_LAMP_DELTA = 1, /* no extent: continuation rays never meet it */
     TRC_LAMP_MIS = 2,   /* continuation rays see it */
     TRC_LAMP_CASTS_SHADOW = 4,
-    TRC_LAMP_SPHERE = 8,     /* TRC_LIGHT_SPHERE */
-    TRC_LAMP_EVEN_CONE = 16, /* TRC_LIGHT_EVEN_CONE */
-    TRC_LAMP_DISTANT = 32,   /* it has no place: position is the direction towards it */
-    TRC_LAMP_LOCAL_UV = 64,  /* TRC_LIGHT_LOCAL_UV */
-    TRC_LAMP_OBJECT = 128,   /* TRC_LIGHT_OBJECT */
-    TRC_LAMP_STRETCHED = 256 /* spot: its cone is not round */
+    TRC_LAMP_SPHERE = 8,      /* TRC_LIGHT_SPHERE */
+    TRC_LAMP_EVEN_CONE = 16,  /* TRC_LIGHT_EVEN_CONE */
+    TRC_LAMP_DISTANT = 32,    /* it has no place: position is the direction towards it */
+    TRC_LAMP_LOCAL_UV = 64,   /* TRC_LIGHT_LOCAL_UV */
+    TRC_LAMP_OBJECT = 128,    /* TRC_LIGHT_OBJECT */
+    TRC_LAMP_STRETCHED = 256, /* spot: its cone is not round */
+    TRC_LAMP_CENTERED = 512   /* TRC_LIGHT_CENTERED */
 };
 
 /* A lamp: 32 words, read by gathers of TRC_LAMP_WORDS stride. Positions in world space. */
@@ -54,7 +55,7 @@ struct trc_lamp {
     uint32_t bounce_limit; /* as trc_light_desc has it */
     uint32_t excluded[2];  /* its light_exclude, low word first */
     uint32_t shadow_class; /* trc_snapshot.shadow_classes */
-    float unused[1];
+    float square_reach;    /* of the sphere about the position that rays meet it in */
 };
 
 /* What the nodes of a lamp need that does not emit evenly. */

@@ -22,6 +22,20 @@ static void set_radiance(struct trc_lamp *lamp, const trc_light_desc *desc, floa
         lamp->radiance[i] = desc->color[i] * desc->strength * factor;
 }
 
+/* Cosine between axes from which on a light counts as sheared. */
+#define MIN_SHEAR 1e-4f
+
+static bool trc_is_sheared(const trc_light_desc *desc) {
+    const float *m = desc->transform;
+    float u[3] = {m[0], m[4], m[8]}, v[3] = {m[1], m[5], m[9]}, w[3] = {m[2], m[6], m[10]};
+    if (!(trc_normalize(u, 1, 0, 0) > 0.0f && trc_normalize(v, 0, 1, 0) > 0.0f &&
+          trc_normalize(w, 0, 0, 1) > 0.0f))
+        return false;
+    const float shear =
+        fmaxf(fabsf(trc_dot(u, v)), fmaxf(fabsf(trc_dot(u, w)), fabsf(trc_dot(v, w))));
+    return shear > MIN_SHEAR;
+}
+
 /* ---- point ---- */
 
 static bool point_make(const trc_light_desc *desc, struct trc_lamp *lamp) {
@@ -44,10 +58,27 @@ static void point_bound(const struct trc_lamp *lamp, struct trc_light_bound *b) 
 
 /* ---- spot ---- */
 
-/* By its Z axis over its X and Y axes: the cone is round in the light's own space. */
+/* The cone is round in the light's own space: by its Z axis over its X and Y axes. Where it is
+ * sheared by the rows of the inverse matrix, over the length of the third, which is the normal. */
 static void stretch_spot(const trc_light_desc *desc, struct trc_lamp *lamp) {
     const float *m = desc->transform;
     float u[3] = {m[0], m[4], m[8]}, v[3] = {m[1], m[5], m[9]}, w[3] = {m[2], m[6], m[10]};
+    if (trc_is_sheared(desc)) {
+        float rows[3][3];
+        trc_cross(v, w, rows[0]);
+        trc_cross(w, u, rows[1]);
+        trc_cross(u, v, rows[2]);
+        const float size = copysignf(trc_length(rows[2]), trc_dot(u, rows[0]));
+        if (size == 0.0f)
+            return;
+        lamp->flags |= TRC_LAMP_STRETCHED;
+        for (int i = 0; i < 3; i++) {
+            lamp->axis_u[i] = rows[0][i] / size;
+            lamp->axis_v[i] = rows[1][i] / size;
+            lamp->normal[i] = -rows[2][i] / size;
+        }
+        return;
+    }
     const float x = trc_normalize(u, 1, 0, 0), y = trc_normalize(v, 0, 1, 0);
     const float z = trc_normalize(w, 0, 0, 1);
     if (!(x > 0.0f && y > 0.0f && z > 0.0f) ||
@@ -77,7 +108,15 @@ static void spot_bound(const struct trc_lamp *lamp, struct trc_light_bound *b) {
     b->cos_o = 1.0f;
     b->cos_e = fmaxf(lamp->cos_cone, 0.0f);
     if (lamp->flags & TRC_LAMP_STRETCHED && b->cos_e > 0.0f) {
-        const float shortest = fminf(trc_length(lamp->axis_u), trc_length(lamp->axis_v));
+        const float length_u = trc_length(lamp->axis_u), length_v = trc_length(lamp->axis_v);
+        const float slant = fmaxf(fabsf(trc_dot(lamp->axis_u, lamp->normal)) / length_u,
+                                  fabsf(trc_dot(lamp->axis_v, lamp->normal)) / length_v);
+        const float skew = fabsf(trc_dot(lamp->axis_u, lamp->axis_v)) / (length_u * length_v);
+        if (fmaxf(slant, skew) > 0.5f * MIN_SHEAR) {
+            b->cos_e = 0.0f; /* sheared: anywhere in front */
+            return;
+        }
+        const float shortest = fminf(length_u, length_v);
         const float widest = sqrtf(1.0f - b->cos_e * b->cos_e) / (b->cos_e * fminf(shortest, 1.0f));
         b->cos_e = 1.0f / sqrtf(1.0f + widest * widest);
     }
@@ -165,6 +204,41 @@ static void ellipse_bound(const struct trc_lamp *lamp, struct trc_light_bound *b
     area_bound(lamp, fmaxf(lamp->half_u, lamp->half_v), b);
 }
 
+/* ---- the same, sheared ---- */
+
+/* Rays meet it where the shadows of the way from its centre on both axes are within its sizes: in a
+ * parallelogram whose sides are across the axes. */
+static bool sheared_make(const trc_light_desc *desc, float fill, struct trc_lamp *lamp) {
+    if (!area_make(desc, fill, lamp))
+        return false;
+    if (desc->flags & TRC_LIGHT_CENTERED)
+        lamp->flags |= TRC_LAMP_CENTERED;
+    float side_u[3], side_v[3];
+    trc_cross(lamp->axis_v, lamp->normal, side_u);
+    trc_cross(lamp->normal, lamp->axis_u, side_v);
+    const float determinant = fabsf(trc_dot(lamp->axis_u, side_u));
+    const float reach =
+        (lamp->half_u * trc_length(side_u) + lamp->half_v * trc_length(side_v)) / determinant;
+    lamp->square_reach = reach * reach;
+    return reach < INFINITY;
+}
+
+static bool sheared_rectangle_make(const trc_light_desc *desc, struct trc_lamp *lamp) {
+    return sheared_make(desc, 1.0f, lamp);
+}
+static void sheared_rectangle_bound(const struct trc_lamp *lamp, struct trc_light_bound *b) {
+    area_bound(lamp, lamp->half_u + lamp->half_v, b);
+    b->cos_o = -1.0f; /* what is sampled lies anywhere */
+}
+
+static bool sheared_ellipse_make(const trc_light_desc *desc, struct trc_lamp *lamp) {
+    return sheared_make(desc, 0.25f * PI, lamp);
+}
+static void sheared_ellipse_bound(const struct trc_lamp *lamp, struct trc_light_bound *b) {
+    area_bound(lamp, lamp->half_u + lamp->half_v, b);
+    b->cos_o = -1.0f;
+}
+
 /* ---- all ---- */
 
 /* Of its kind; false for one that has no such shape. */
@@ -201,6 +275,8 @@ bool trc_lamp_make(const trc_light_desc *desc, struct trc_lamp *lamp) {
         (desc->use_mis ? TRC_LAMP_MIS : 0) | (desc->cast_shadow ? TRC_LAMP_CASTS_SHADOW : 0);
     if (!make_kind(desc, lamp))
         return false;
+    if (lamp->square_reach == 0.0f)
+        lamp->square_reach = lamp->half_u * lamp->half_u + lamp->half_v * lamp->half_v;
     const float light = trc_brightness(lamp->radiance);
     return light > 0.0f && light < INFINITY && (desc->visibility & TRC_VISIBLE_ALL) != 0;
 }

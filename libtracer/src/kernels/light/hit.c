@@ -54,7 +54,7 @@ TRC_INLINE vmask near_lamp(const struct trc_lamp *lamp, vvec3 p, vvec3 wi) {
         return vf_ge(v3_dot(v3_set(lamp->position), wi), vf_set(lamp->cos_cone));
     const vvec3 to = v3_sub(v3_set(lamp->position), p);
     const vfloat along = v3_dot(to, wi);
-    const float r2 = lamp->half_u * lamp->half_u + lamp->half_v * lamp->half_v;
+    const float r2 = lamp->square_reach;
     /* Rounding of the difference grows with the squared distance. */
     const vfloat d2 = v3_dot(to, to), slack = d2 * vf_set(1e-5f) + vf_set(1.001f * r2);
     return vf_le(d2 - along * along, slack);

@@ -451,4 +451,6 @@ TRC_INLINE void trc_ellipse_place(const struct trc_wide_lamp *l, const struct tr
     trc_rectangle_place(l, a, off, out, q);
 }
 
+#include "kernels/light/sheared.h"
+
 #endif
