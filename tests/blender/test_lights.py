@@ -142,13 +142,13 @@ def errors(blender_of_module):
 def test_against_cycles(errors, name):
     _mean, biased, tile = errors[name]
     assert biased < TOLERANCE
-<<<<<<< HEAD
-    assert tile < TOLERANCE
+    assert tile < (SHEARED_TOLERANCE if "sheared" in name else TOLERANCE)
 
 
 # Worlds without shadows --------------------------------------------------------------------------
 
 SHADOWLESS_SINCE = (5, 2), "worlds always cast shadows"
+SHADOWLESS_TILE = 0.03  # matt surfaces' parts of samples and of rays go by densities, which are each engine's own
 
 
 def inside_shadowless():
@@ -181,12 +181,10 @@ def _fade(tree):
 
 @pytest.mark.since(*SHADOWLESS_SINCE)
 def test_world_without_shadows(blender):
-    """Errors within noise; with its shadows translucent surfaces would be 28 % too dark."""
+    """With its shadows translucent surfaces would be 28 % too dark, without those of rays matt ones 6 % too bright."""
     if blender_support.version() < SHADOWLESS_SINCE[0]:
         pytest.skip(SHADOWLESS_SINCE[1])
     for case, (ours, theirs) in blender.run(inside_shadowless).items():
         ours, theirs = ours[..., :3], theirs[..., :3]
-        assert all(error <= TOLERANCE * theirs.mean() for error in compare.unexplained(ours, theirs)), case
-=======
-    assert tile < (SHEARED_TOLERANCE if "sheared" in name else TOLERANCE)
->>>>>>> 266b10b (Lights that parents shear are lit as by Cycles)
+        biased, tile = (error / theirs.mean() for error in compare.unexplained(ours, theirs))
+        assert biased < TOLERANCE and tile < SHADOWLESS_TILE, (case, biased, tile)

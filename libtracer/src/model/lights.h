@@ -183,7 +183,7 @@ struct trc_light_table {
     struct trc_world_map *map;    /* NULL: cosine or uniform sampling */
     uint32_t world_visibility;    /* of its light samples */
     bool world_asks_rays;         /* its light depends on the kind of ray */
-    bool world_casts_shadow;
+    bool world_is_shadowless;     /* nothing blocks its samples */
 };
 
 #endif

@@ -231,7 +231,7 @@ static trc_status add_world(struct trc_light_table *table, const struct trc_snap
         table->map = NULL;
     }
     table->world_asks_rays = asks;
-    table->world_casts_shadow = !table->map || !world || world->cast_shadow;
+    table->world_is_shadowless = table->map && world && !world->cast_shadow;
     return TRC_OK;
 }
 

@@ -181,7 +181,7 @@ static void sample_world(const struct draw *d, vmask m) {
             place.radiance = v3_add(v3_abs(place.radiance), v3_abs(seen[k]));
     }
     set_place(d, &place, m);
-    if (!d->table->world_casts_shadow)
+    if (d->table->world_is_shadowless)
         d->out->casts_shadow = vm_andnot(d->out->casts_shadow, m);
 }
 

@@ -67,10 +67,10 @@ static void ambient_samples(struct trc_tile *t, const struct arrival *a,
         const struct trc_light_sample sample = {
             .wi = v3_from_frame(trc_warp_cosine(u[0], u[1]), x, y, n),
             .distance = distance,
-            .casts_shadow = vm_all_set(),
             .light = vi_set(number)};
         const vvec3 light = adds ? white : ambient_world(t, s, lobes, n, sample.wi, active);
-        const struct light_result r = {.diffuse = v3_mul(weight, light)};
+        const struct light_result r = {.diffuse = v3_mul(weight, light),
+                                       .is_blocked = vm_all_set()};
         const vfloat size = v3_max(v3_abs(r.diffuse));
         const vmask lit = vm_and(active, is_light(size));
         if (!vm_any(lit))
@@ -113,11 +113,12 @@ void trc_ambient_pass(struct trc_tile *t, const struct arrival *a, const struct 
     const struct trc_light_sample sample = {
         .wi = v3_from_frame(trc_warp_cosine(u[0], u[1]), x, y, n),
         .distance = vf_set(t->snapshot->world.ao_distance),
-        .casts_shadow = t->snapshot->world.ao_distance > 0.0f ? vm_all_set() : vm_none(),
         .light = vi_set((int32_t)(lights->first_triangle + lights->triangle_count))};
     const vvec3 one = v3(vf_set(1.0f), vf_set(1.0f), vf_set(1.0f));
     const vvec3 alpha = v3_sub(one, trc_lobes_transparency(lobes));
-    const struct light_result r = {.diffuse = v3_mul(a->weight, alpha)};
+    const struct light_result r = {
+        .diffuse = v3_mul(a->weight, alpha),
+        .is_blocked = t->snapshot->world.ao_distance > 0.0f ? vm_all_set() : vm_none()};
     active = vm_and(active, vf_gt(v3_max(r.diffuse), vf_set(0.0f)));
     struct arrival own = *a;
     own.path = a->path | vu_set(TRC_PATH_OCCLUSION);

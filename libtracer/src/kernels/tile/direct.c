@@ -5,6 +5,8 @@
 #include <stddef.h>
 
 #include "kernels/light/world.h"
+#include "kernels/light/world_place.h"
+#include "kernels/program/hash.h"
 #include "kernels/tile/shade.h"
 #include "kernels/trace/mesh_fetch.h"
 #include "kernels/trace/spawn.h"
@@ -87,6 +89,21 @@ static vuint light_seen(const struct trc_tile *t, const struct trc_surface *s,
     return (vuint)vi_select(vm_and(behind, vi_eq(transmitted, vi_set(0))), vi_set(0), (vint)seen);
 }
 
+/* The part of the world's light that Cycles has by samples where rays of that density find it, too.
+ * Its samples are of the world's own density, without regard to the receiver. */
+static vfloat sampled_part(const struct trc_surface *s, const struct trc_light_sample *l,
+                           vfloat by_ray, vmask m) {
+    const vfloat density = trc_world_density(s->snapshot->lights, s->n, vm_none(), l->wi, m);
+    const vfloat by_sample = density * vf_divide(l->pdf, l->density);
+    const vfloat pl2 = vf_square(by_sample), pb2 = vf_square(by_ray);
+    return vf_divide(pl2, pl2 + pb2);
+}
+
+/* The density of the rays that Cycles sends from matt lobes. */
+static vfloat matt_density(const struct trc_surface *s, const struct trc_light_sample *l) {
+    return vf_abs(v3_dot(s->n, l->wi)) * vf_set(TRC_INV_PI);
+}
+
 /* What the world's light is to diffuse, glossy and transmitted rays that go where samples of it do.
  * Where Cycles has no samples, rays find it all. Else samples are told of no ray, and rays find the
  * rest: those of matt lobes, which are not followed, by the densities of both there. */
@@ -96,10 +113,8 @@ static void world_by_kind(const struct trc_surface *s, const struct trc_light_sa
     trc_world_shade_kinds(s->snapshot, l->wi, behind, m, seen);
     if (!s->snapshot->lights->map)
         return;
-    const vfloat by_ray = vf_abs(v3_dot(s->n, l->wi)) * vf_set(TRC_INV_PI);
-    const vfloat pl2 = vf_square(l->pdf), pb2 = vf_square(by_ray);
     const vvec3 sampled = trc_world_shade(s->snapshot, l->wi, vu_set(0), m);
-    seen[0] = v3_lerp(seen[0], sampled, vf_divide(pl2, pl2 + pb2));
+    seen[0] = v3_lerp(seen[0], sampled, sampled_part(s, l, matt_density(s, l), m));
     seen[1] = seen[2] = sampled;
 }
 
@@ -115,6 +130,23 @@ static void world_light_by_kind(const struct arrival *a, const struct trc_surfac
     world_by_kind(s, l, m, seen);
     for (int k = 0; k < 3; k++)
         light[k] = v3_select(m, v3_mul(a->weight, v3_scale(seen[k], scale)), light[k]);
+}
+
+/* Lanes whose samples of a world that casts no shadows stand for what rays bring in Cycles, which
+ * things block: all that mis is above Cycles' part of samples, by chance. by_ray: the density of
+ * rays, of matt lobes 0. */
+static vmask stands_for_rays(const struct trc_surface *s, const struct trc_light_sample *l,
+                             vfloat by_ray, vfloat mis, vvec3 diffuse, vmask active) {
+    const vint world = vi_set((int32_t)s->snapshot->lights->world_light);
+    const vmask m = vm_and(active, vi_eq(l->light, world));
+    if (!vm_any(m))
+        return m;
+    const vfloat zero = vf_set(0.0f);
+    const vmask matt =
+        vm_and(vf_gt(v3_dot(s->n, l->wi), zero), vf_gt(v3_max(v3_abs(diffuse)), zero));
+    by_ray = vf_max(by_ray, vf_where(matt, matt_density(s, l)));
+    const vfloat chance = hash3(l->wi.x, l->wi.y, l->wi.z);
+    return vm_and(m, vf_ge(chance * mis, sampled_part(s, l, by_ray, m)));
 }
 
 /* Contributions of the lanes' light samples, weighted; lanes that get nothing are dropped from
@@ -155,6 +187,10 @@ static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
         v3_mul(light[2],
                v3_scale(v3_select(SEEN(TRC_VISIBLE_TRANSMISSION), f.transmission, v3_zero()), mis));
 #undef SEEN
+    out->is_blocked = l->casts_shadow;
+    if (t->snapshot->lights->world_is_shadowless)
+        out->is_blocked = vm_or(
+            out->is_blocked, stands_for_rays(s, l, f.pdf * a->chance, mis, out->diffuse, active));
     const vvec3 sum = v3_add(out->diffuse, v3_add(out->glossy, out->transmission));
     const vfloat size = v3_max(v3_abs(sum)); /* there are lights that take light away */
     return vm_and(active, is_light(size));
@@ -187,7 +223,7 @@ TRC_INLINE void push(struct trc_tile *t, const struct arrival *a, const struct t
     const vmask far = vf_ge(l->distance, vf_set(TRC_FAR));
     const vvec3 target = v3_add(v3_scale(l->wi, vf_select(far, vf_set(1.0f), l->distance)),
                                 v3_select(far, v3_zero(), v3_sub(s->p, o)));
-    const vfloat tmax = vf_select(vm_not(l->casts_shadow), vf_set(-1.0f),
+    const vfloat tmax = vf_select(vm_not(r->is_blocked), vf_set(-1.0f),
                                   vf_select(far, vf_set(INFINITY), vf_set(SHADOW_END)));
     const vvec3 sum = v3_add(r->diffuse, v3_add(r->glossy, r->transmission));
     const struct trc_shadow_rays rays = {
