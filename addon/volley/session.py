@@ -164,29 +164,26 @@ class Session:
 
 
 class CameraMotion:
-    """The render camera over the shutter, for each stereo view: keys by view name. As in Cycles, that of the frame: a
-    marker that the shutter passes switches to no other.
+    """The render camera over the shutter, for each stereo view, which may have one of its own: keys by view name. As in
+    Cycles, that of the frame: a marker that the shutter passes switches to no other.
 
     ``count`` is how many times it wants to be looked at."""
 
     def __init__(self, engine, depsgraph, frame, shutter, view_names, warnings):
         self._engine, self._depsgraph, self._frame, self._warnings = engine, depsgraph, frame, warnings
-        self._view_names = view_names
-        self.count = 1
         if engine.camera_override is None:
             raise native.TracerError(abi.StatusCode.ERROR_INVALID_ARGUMENT, "the scene has no camera")
-        self._camera = engine.camera_override.original  # the evaluated one may not outlive a switch
-        if shutter is not None:
-            self.count = motion.key_count(engine.camera_override)
+        self.count = motion.key_count(engine.camera_override) if shutter is not None else 1
+        # Evaluated ones may not outlive a switch.
+        self._cameras = {name: self._shown(name).original for name in view_names}
         self.keys = {}
 
     def look(self, fraction):
         """Note where the camera is at a fraction of the shutter; the centre comes first."""
-        for name in self._view_names:
-            if name:
-                self._engine.active_view_set(name)
-            evaluated = self._camera.evaluated_get(self._depsgraph)
-            keys = camera.render_camera(self._engine, evaluated, self._frame, self._warnings)
+        for name, original in self._cameras.items():
+            self._shown(name)
+            keys = camera.render_camera(self._engine, original.evaluated_get(self._depsgraph), self._frame,
+                                        self._warnings)
             if name not in self.keys:
                 keys.transforms *= self.count
                 keys.windows *= self.count
@@ -197,6 +194,12 @@ class CameraMotion:
                 centre = self.keys[name]
                 centre.transforms[index] = keys.transforms[0]
                 centre.windows[index] = camera.zoomed_window(centre.windows[self.count // 2], centre.lens, keys.lens)
+
+    def _shown(self, name):
+        """The evaluated camera of a view, which becomes the one that the engine shows."""
+        if name:
+            self._engine.active_view_set(name)
+        return self._engine.camera_override
 
 
 class _Run:
