@@ -163,20 +163,10 @@ def inside_shadowless():
         material = scenes.material(name, node, Color=(0.8, 0.8, 0.8), **inputs)
         scenes.mesh("Floor", [(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [(0, 1, 2, 3)], material)
         scenes.sphere("Ball", 1.0, (0.0, 0.0, 1.0), material)
-        scenes.world_color(scene.world, (0.5, 0.5, 0.5))
-        if not is_even:
-            _fade(scene.world.node_tree)
+        _light_world(scene.world, 1.0, has_gradient=not is_even)
         scene.world.cycles.use_shadows = False
         pictures["even" if is_even else "varied", name] = scenes.seeds_by_both(SAMPLES * len(SEEDS), SEEDS)
     return pictures
-
-
-def _fade(tree):
-    """Let a world be the brighter the farther along X."""
-    gradient, place = tree.nodes.new("ShaderNodeTexGradient"), tree.nodes.new("ShaderNodeTexCoord")
-    background = next(node for node in tree.nodes if node.type == 'BACKGROUND')
-    tree.links.new(place.outputs["Generated"], gradient.inputs["Vector"])
-    tree.links.new(gradient.outputs["Color"], background.inputs["Color"])
 
 
 @pytest.mark.since(*SHADOWLESS_SINCE)

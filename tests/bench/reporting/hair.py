@@ -26,6 +26,7 @@ def headlines(results):
     lines = []
     for cycles, made in elsewhere.beside(results, "hair"):
         at = [f"{digits(ratios[0], 2)} to {digits(ratios[-1], 2)} times as long at {width}×{height}"
+              + f" ({len(ratios)} of them)" * (len(ratios) < len(made))
               for (width, height), ratios in ((size, [gain["ratio"] for _name, gain in whole_renders.gains(made, key)])
                                               for size, key in ((SIZE_PX, "seconds"), (LARGE_SIZE_PX, LARGE))) if ratios]
         lines.append(f"With {len(made)} scenes of hair, a first F12 of {whole_renders.SAMPLES} samples takes {cycles} "

@@ -267,6 +267,12 @@ TRC_INLINE vfloat trc_spread_factor(const struct trc_wide_lamp *l, vvec3 wi) {
     return vf_select(vf_gt(l->tan_spread, vf_zero()), vf_max(factor, vf_zero()), vf_one());
 }
 
+/* How far from the foot of a point at that height slats show the light; any distance without. */
+TRC_INLINE vfloat trc_slats_reach(const struct trc_wide_lamp *l, vfloat height) {
+    const vmask narrow = vf_gt(l->tan_spread, vf_zero());
+    return vf_select(narrow, vf_divide(height, l->tan_spread), vf_set(INFINITY));
+}
+
 /* A rectangle in the frame of its axes with the point at the origin: x0..x1, y0..y1 at depth z > 0,
  * cut to what the slats show of it. */
 struct trc_view_rectangle {
@@ -282,10 +288,8 @@ TRC_INLINE struct trc_view_rectangle trc_rectangle_view(const struct trc_wide_la
     r.x1 = cx + l->half_u;
     r.y0 = cy - l->half_v;
     r.y1 = cy + l->half_v;
-    const vmask narrow = vf_gt(l->tan_spread, vf_zero());
-    if (vm_any(narrow)) {
-        /* Light passes up to the slats' angle: a circle about the foot of the point. */
-        const vfloat limit = vf_select(narrow, vf_divide(r.z, l->tan_spread), vf_set(INFINITY));
+    if (vm_any(vf_gt(l->tan_spread, vf_zero()))) {
+        const vfloat limit = trc_slats_reach(l, r.z);
         r.x0 = vf_max(r.x0, -limit);
         r.x1 = vf_min(r.x1, limit);
         r.y0 = vf_max(r.y0, -limit);

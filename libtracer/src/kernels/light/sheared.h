@@ -4,6 +4,8 @@
  * and the place is put together from these again, which is another one. So light does not come from
  * a parallelogram, but the pictures agree. Rays meet both shapes by the same products
  * (kernels/light/lamps.h). Part of kernels/light/lamps.h. */
+#ifndef TRACER_KERNELS_LIGHT_SHEARED_H
+#define TRACER_KERNELS_LIGHT_SHEARED_H
 
 /* A rectangle in its frame, and the frame's third axis, of the length that the first two give it.
  */
@@ -17,10 +19,8 @@ TRC_INLINE struct trc_sheared_view trc_sheared_view(const struct trc_wide_lamp *
     const vfloat height = -v3_dot(to, l->normal);
     s.r.lit = vf_gt(height, vf_zero());
     vfloat u0 = -l->half_u, u1 = l->half_u, v0 = -l->half_v, v1 = l->half_v;
-    const vmask narrow = vf_gt(l->tan_spread, vf_zero());
-    if (vm_any(narrow)) {
-        /* Light passes up to the slats' angle: a circle about the foot of the point. */
-        const vfloat limit = vf_select(narrow, vf_divide(height, l->tan_spread), vf_set(INFINITY));
+    if (vm_any(vf_gt(l->tan_spread, vf_zero()))) {
+        const vfloat limit = trc_slats_reach(l, height);
         const vvec3 foot = v3_neg(v3_add(to, v3_scale(l->normal, height)));
         const vfloat foot_u = v3_dot(foot, l->axis_u), foot_v = v3_dot(foot, l->axis_v);
         u0 = vf_max(u0, foot_u - limit);
@@ -112,3 +112,5 @@ TRC_INLINE void trc_sheared_ellipse_place(const struct trc_wide_lamp *l,
                                           struct trc_lamp_place *q) {
     trc_rectangle_place(l, a, off, out, q);
 }
+
+#endif

@@ -139,6 +139,7 @@ static void add_number(struct trc_tile *t, uint32_t pass, vfloat value, const ui
     trc_pass_add_lanes(t, pass, v3(value, vf_zero(), vf_zero()), slots, active);
 }
 
+/* The path word of what leaves that part of the passes, in 255ths. */
 static vuint with_features_left(vuint path, vfloat left) {
     const vint taken = vf_to_int((vf_one() - left) * vf_set(255.0f) + vf_set(0.5f));
     return (path & vu_set(~TRC_PATH_FEATURES)) | (vuint)taken << TRC_PATH_FEATURES_SHIFT;
