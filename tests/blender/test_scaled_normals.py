@@ -10,9 +10,9 @@ SAMPLES = 64
 OFF = 0.01  # of the mean in a tile; the other way is off by up to 55 %
 SHARP = "deforming, of faces and corners"
 SINCE = (4, 0), "Cycles 3.4 has other normals at sharp edges of what deforms"
-KINDS = ("alone", "mirrored", "of faces and corners", "instanced", "shared", "moving", "still in motion blur",
-         "displaced", "with persistent data", "deforming", "deforming, mirrored", SHARP, "deforming, shared",
-         "deforming and moving")
+KINDS = ("alone", "mirrored", "of faces and corners", "of sharp edges alone", "instanced", "shared", "moving",
+         "still in motion blur", "displaced", "with persistent data", "deforming", "deforming, mirrored", SHARP,
+         "deforming, shared", "deforming and moving")
 
 
 # Inside Blender ------------------------------------------------------------------------------------
@@ -53,6 +53,9 @@ def _cone(kind):
             edge.use_edge_sharp = True
         if hasattr(made.data, "use_auto_smooth"):
             made.data.use_auto_smooth = True
+    elif kind == "of sharp edges alone":  # as Smooth by Angle leaves flat faces: smooth flags, and flat from 4.1 on
+        for edge in made.data.edges:
+            edge.use_edge_sharp = True
     elif kind == "instanced":
         collection = bpy.data.collections.new("Source")
         scene.collection.objects.unlink(made)

@@ -162,9 +162,11 @@ def _is_bounding_box(positions, location, size):
 
 
 class Topology:
-    """Which vertices the faces of a mesh join, to tell whether a later shape only moves them."""
+    """Which vertices the faces of a mesh join, to tell whether a later shape only moves them, and what its normals
+    belong to."""
 
     def __init__(self, mesh):
+        self.normals_domain = normals_domain(mesh)
         self._counts = len(mesh.vertices), len(mesh.polygons)
         self._corners = np.array(_corner_items(mesh))
 
@@ -218,7 +220,10 @@ def memory_of(collection, name, width, dtype):
 def read_normals(mesh, data, loops=None):
     """Fill normals, their kind and the smooth flags, by what Blender would shade with."""
     loops = loops or LazyLoops(mesh, len(data.indices))
-    if has_corner_normals(mesh):
+    domain = normals_domain(mesh)
+    if domain == 'FACE':
+        return
+    if domain == 'CORNER':
         data.corners = loops.of_triangles
         data.normals, data.normal_kind = corner_normals(mesh)[data.corners], abi.NormalsLayout.CORNER
         return
@@ -275,12 +280,13 @@ def _material_index(mesh, loops):
     return slots.clip(0, 0xFFFF).astype(np.uint16)[loops.polygons]
 
 
-def has_corner_normals(mesh):
-    """Whether normals belong to corners: auto-smooth or custom normals before 4.1, a domain since."""
-    domain = getattr(mesh, "normals_domain", None)
-    if domain is not None:
-        return domain == 'CORNER'
-    return mesh.use_auto_smooth
+def normals_domain(mesh):
+    """What the normals belong to by which Blender shades: 'CORNER', 'POINT' or 'FACE'. Sharp edges alone make faces
+    flat, too, so from 4.1 on their flags do not say all; before it they tell 'POINT' from 'FACE', and the former
+    stands for both."""
+    if hasattr(mesh, "normals_domain"):
+        return mesh.normals_domain
+    return 'CORNER' if mesh.use_auto_smooth else 'POINT'
 
 
 def corner_normals(mesh):

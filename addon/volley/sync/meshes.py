@@ -4,7 +4,7 @@
 import zlib
 
 from .. import abi, native
-from .mesh import corner_normals, has_corner_normals, read_positions, vertex_normals
+from .mesh import corner_normals, normals_domain, read_positions, vertex_normals
 
 
 class MeshEntry:
@@ -88,9 +88,9 @@ class Meshes:
             return False
         if not (entry.poses.has_counts_of(mesh) if is_known else entry.poses.is_of(mesh)):
             return False
-        normals = None
-        if has_corner_normals(mesh) != (entry.normal_kind == abi.NormalsLayout.CORNER):
+        if normals_domain(mesh) != entry.poses.normals_domain:
             return False
+        normals = None
         if entry.normal_kind == abi.NormalsLayout.CORNER:
             normals = corner_normals(mesh)[entry.corners][None]
         elif entry.normal_kind == abi.NormalsLayout.VERTEX:
