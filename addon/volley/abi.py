@@ -756,6 +756,7 @@ class FeatureFlags(IntFlag):
     CURVES = 4194304
     SHADOW_TERMINATORS = 8388608
     SHADOW_SLOPES = 16777216
+    RAY_KINDS = 33554432
 
 
 class CameraDesc(Structure):

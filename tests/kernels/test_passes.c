@@ -340,7 +340,8 @@ static trc_scene lit_floor(uint32_t method) {
     desc.materials = &shining;
     desc.material_count = 1;
     desc.light_group = 2;
-    desc.visibility = TRC_VISIBLE_ALL & ~(uint32_t)TRC_VISIBLE_SHADOW; /* nothing is in its shade */
+    /* Nothing is in its shade: the world's samples are for rays of matt lobes. */
+    desc.visibility = TRC_VISIBLE_ALL & ~(uint32_t)(TRC_VISIBLE_SHADOW | TRC_VISIBLE_DIFFUSE);
     assert_ok(trc_instance_create(scene, &desc, &instance));
     mesh_free(&disk);
     trc_world_desc world =

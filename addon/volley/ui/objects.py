@@ -57,8 +57,6 @@ class VOLLEY_OBJECT_PT_ray_visibility(_SeenObjectPanel, Panel):
         if active.type == 'LIGHT':
             return
         column.prop(active, "visible_shadow", text="Shadow")
-        if active.visible_diffuse != active.visible_shadow:
-            column.label(text="The world's light goes by Shadow alone", icon='INFO')
 
 
 class VOLLEY_OBJECT_PT_culling(_SeenObjectPanel, Panel):

@@ -67,7 +67,9 @@ enum trc_feature_flags {
     TRC_FEATURE_CURVES = 1 << 22,
     /* Some instance has shadow terminator offsets other than the defaults. */
     TRC_FEATURE_SHADOW_TERMINATORS = 1 << 23,
-    TRC_FEATURE_SHADOW_SLOPES = 1 << 24 /* some surface that shadow rays pass has bumps there */
+    TRC_FEATURE_SHADOW_SLOPES = 1 << 24, /* some surface that shadow rays pass has bumps there */
+    /* What is in a light's way tells shadow rays from those that lobes send. */
+    TRC_FEATURE_RAY_KINDS = 1 << 25
 };
 
 typedef struct trc_scene_stats {

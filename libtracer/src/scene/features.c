@@ -32,9 +32,20 @@ static uint32_t material_features(uint32_t has) {
 
 static uint32_t surface_features(const struct trc_material *m) {
     const struct trc_material *shadow = m->shadow ? m->shadow : m;
-    const bool has_slopes =
-        trc_material_shadows_transparent(m) && (shadow->has & TRC_MATERIAL_READS_PIXEL);
-    return material_features(m->has) | (has_slopes ? (uint32_t)TRC_FEATURE_SHADOW_SLOPES : 0u);
+    const uint32_t passed = trc_material_shadows_transparent(m) ? shadow->has : 0;
+    uint32_t features = material_features(m->has);
+    if (passed & TRC_MATERIAL_READS_PIXEL)
+        features |= TRC_FEATURE_SHADOW_SLOPES;
+    if (passed & TRC_MATERIAL_READS_LIGHT_PATH)
+        features |= TRC_FEATURE_RAY_KINDS;
+    return features;
+}
+
+/* Whether shadow rays see an instance and those of some lobe do not, or the other way. */
+static bool tells_shadow_rays(const struct trc_instance *instance) {
+    const uint32_t lobes = TRC_VISIBLE_DIFFUSE | TRC_VISIBLE_GLOSSY | TRC_VISIBLE_TRANSMISSION;
+    return (instance->visibility & lobes) !=
+           (instance->visibility & TRC_VISIBLE_SHADOW ? lobes : 0u);
 }
 
 /* Meshes count whether or not the camera's shutter is open: queries have times of their own. */
@@ -44,6 +55,8 @@ static uint32_t instance_features(const struct trc_snapshot *s) {
         const struct trc_instance *instance = &s->instances[i];
         if ((instance->visibility & TRC_VISIBLE_ALL) != TRC_VISIBLE_ALL)
             features |= TRC_FEATURE_VISIBILITY;
+        if (tells_shadow_rays(instance))
+            features |= TRC_FEATURE_RAY_KINDS;
         if (!instance->visibility)
             continue;
         if (instance->light_exclude || instance->shadow_class)

@@ -52,10 +52,8 @@ vvec3 trc_world_shade(const struct trc_snapshot *snapshot, vvec3 direction, vuin
 
 void trc_world_shade_kinds(const struct trc_snapshot *snapshot, vvec3 direction, vmask behind,
                            vmask active, vvec3 seen_out[3]) {
-    const vint diffuse = vi_select(behind, vi_set(TRC_VISIBLE_DIFFUSE | TRC_VISIBLE_TRANSMISSION),
-                                   vi_set(TRC_VISIBLE_DIFFUSE | TRC_PATH_REFLECTED));
-    const vuint kinds[3] = {(vuint)diffuse, vu_set(TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED),
-                            vu_set(TRC_VISIBLE_TRANSMISSION)};
+    vuint kinds[3];
+    trc_lobe_rays(behind, kinds);
     for (int i = 0; i < 3; i++)
         seen_out[i] = trc_world_shade(snapshot, direction, kinds[i], active);
 }

@@ -59,6 +59,8 @@ static void ambient_samples(struct trc_tile *t, const struct arrival *a,
     own.path = a->path | vu_set(adds ? TRC_PATH_CLAMPED : 0);
     v3_frame(n, &x, &y);
     trc_shadow_reserve(t, sample_count);
+    /* Those that replace the world's light stand for rays of matt lobes. */
+    const uint32_t kind = adds ? TRC_VISIBLE_SHADOW : TRC_VISIBLE_DIFFUSE | TRC_PATH_REFLECTED;
     /* Packets of their own: numbered after all lights. */
     const int32_t number = (int32_t)(lights->first_triangle + lights->triangle_count);
     for (uint32_t l = 0; l < sample_count; l++) {
@@ -69,8 +71,8 @@ static void ambient_samples(struct trc_tile *t, const struct arrival *a,
             .distance = distance,
             .light = vi_set(number)};
         const vvec3 light = adds ? white : ambient_world(t, s, lobes, n, sample.wi, active);
-        const struct light_result r = {.diffuse = v3_mul(weight, light),
-                                       .is_blocked = vm_all_set()};
+        const struct light_result r = {
+            .diffuse = v3_mul(weight, light), .is_blocked = vm_all_set(), .kind = vu_set(kind)};
         const vfloat size = v3_max(v3_abs(r.diffuse));
         const vmask lit = vm_and(active, is_light(size));
         if (!vm_any(lit))
@@ -79,7 +81,7 @@ static void ambient_samples(struct trc_tile *t, const struct arrival *a,
         if (adds) {
             trc_shadow_push(t, &own, s, &sample, &r, cell, lit);
         } else {
-            /* They stand for rays of the path, and start as those do. */
+            /* They start as rays of the path do. */
             const vvec3 o = trc_spawn_origin(s, goes_out(s, sample.wi));
             trc_shadow_push_from(t, &own, s, &sample, &r, &o, cell, lit);
         }
@@ -118,7 +120,8 @@ void trc_ambient_pass(struct trc_tile *t, const struct arrival *a, const struct 
     const vvec3 alpha = v3_sub(one, trc_lobes_transparency(lobes));
     const struct light_result r = {
         .diffuse = v3_mul(a->weight, alpha),
-        .is_blocked = t->snapshot->world.ao_distance > 0.0f ? vm_all_set() : vm_none()};
+        .is_blocked = t->snapshot->world.ao_distance > 0.0f ? vm_all_set() : vm_none(),
+        .kind = vu_set(TRC_VISIBLE_SHADOW)};
     active = vm_and(active, vf_gt(v3_max(r.diffuse), vf_set(0.0f)));
     struct arrival own = *a;
     own.path = a->path | vu_set(TRC_PATH_OCCLUSION);

@@ -132,14 +132,14 @@ static void world_light_by_kind(const struct arrival *a, const struct trc_surfac
         light[k] = v3_select(m, v3_mul(a->weight, v3_scale(seen[k], scale)), light[k]);
 }
 
-/* Lanes whose samples of a world that casts no shadows stand for what rays bring in Cycles, which
- * things block: all that mis is above Cycles' part of samples, by chance. by_ray: the density of
- * rays, of matt lobes 0. */
+/* Lanes whose samples of the world stand for what rays bring in Cycles: all that mis is above
+ * Cycles' part of samples, by chance, and all of worlds that it does not sample. by_ray: the
+ * density of rays, of matt lobes 0. */
 static vmask stands_for_rays(const struct trc_surface *s, const struct trc_light_sample *l,
                              vfloat by_ray, vfloat mis, vvec3 diffuse, vmask active) {
     const vint world = vi_set((int32_t)s->snapshot->lights->world_light);
     const vmask m = vm_and(active, vi_eq(l->light, world));
-    if (!vm_any(m))
+    if (!s->snapshot->lights->map || !vm_any(m))
         return m;
     const vfloat zero = vf_set(0.0f);
     const vmask matt =
@@ -147,6 +147,28 @@ static vmask stands_for_rays(const struct trc_surface *s, const struct trc_light
     by_ray = vf_max(by_ray, vf_where(matt, matt_density(s, l)));
     const vfloat chance = hash3(l->wi.x, l->wi.y, l->wi.z);
     return vm_and(m, vf_ge(chance * mis, sampled_part(s, l, by_ray, m)));
+}
+
+/* The kind of the rays for which the lanes' samples stand: of the lobes that bring most. */
+static vuint lobe_ray(const struct trc_surface *s, const struct trc_light_sample *l,
+                      const struct light_result *r) {
+    vuint kinds[3];
+    trc_lobe_rays(vf_lt(v3_dot(s->ng, l->wi), vf_set(0.0f)), kinds);
+    const vfloat matt = v3_max(v3_abs(r->diffuse)), glossy = v3_max(v3_abs(r->glossy));
+    const vfloat transmitted = v3_max(v3_abs(r->transmission));
+    const vint rest = vi_select(vf_ge(glossy, transmitted), (vint)kinds[1], (vint)kinds[2]);
+    return (vuint)vi_select(vf_ge(matt, vf_max(glossy, transmitted)), (vint)kinds[0], rest);
+}
+
+/* Where the world casts no shadows, or what is in its way tells shadow rays from others: what its
+ * samples that stand for rays are to that. by_ray: see stands_for_rays. */
+static __attribute__((noinline)) void stand_for_rays(const struct trc_surface *s,
+                                                     const struct trc_light_sample *l,
+                                                     vfloat by_ray, vfloat mis, vmask active,
+                                                     struct light_result *r) {
+    const vmask rays = stands_for_rays(s, l, by_ray, mis, r->diffuse, active);
+    r->is_blocked = vm_or(r->is_blocked, rays);
+    r->kind = (vuint)vi_select(rays, (vint)lobe_ray(s, l, r), (vint)r->kind);
 }
 
 /* Contributions of the lanes' light samples, weighted; lanes that get nothing are dropped from
@@ -188,9 +210,9 @@ static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
                v3_scale(v3_select(SEEN(TRC_VISIBLE_TRANSMISSION), f.transmission, v3_zero()), mis));
 #undef SEEN
     out->is_blocked = l->casts_shadow;
-    if (t->snapshot->lights->world_is_shadowless)
-        out->is_blocked = vm_or(
-            out->is_blocked, stands_for_rays(s, l, f.pdf * a->chance, mis, out->diffuse, active));
+    out->kind = vu_set(TRC_VISIBLE_SHADOW);
+    if (t->snapshot->lights->world_is_shadowless || (t->snapshot->features & TRC_FEATURE_RAY_KINDS))
+        stand_for_rays(s, l, f.pdf * a->chance, mis, active, out);
     const vvec3 sum = v3_add(out->diffuse, v3_add(out->glossy, out->transmission));
     const vfloat size = v3_max(v3_abs(sum)); /* there are lights that take light away */
     return vm_and(active, is_light(size));
@@ -233,7 +255,7 @@ TRC_INLINE void push(struct trc_tile *t, const struct arrival *a, const struct t
         .time = a->time,
         .radiance = {sum.x, sum.y, sum.z},
         .slot = a->slot,
-        .path = a->path & vu_set(~TRC_PATH_FEATURES),
+        .path = (a->path & vu_set(~(TRC_PATH_FEATURES | TRC_PATH_KIND))) | r->kind,
         .target = (vuint)l->light * vu_set(TRC_DIRECTION_CELLS) + cell,
         .depths = a->depths,
     };

@@ -24,7 +24,7 @@ static void found_push(struct trc_tile *t, const struct arrival *a, vvec3 radian
     const vmask far = vf_ge(distance, vf_set(TRC_FAR));
     const vfloat end = vf_select(far, vf_set(INFINITY), vf_set(SHADOW_END));
     const vvec3 target = v3_scale(a->d, vf_select(far, vf_set(1.0f), distance));
-    const vuint path = vu_set(TRC_PATH_FOUND | TRC_PATH_CLAMPED) |
+    const vuint path = vu_set(TRC_PATH_FOUND | TRC_PATH_CLAMPED | TRC_VISIBLE_SHADOW) |
                        trc_light_shadow_class(t->snapshot, light, active) << TRC_PATH_CLASS_SHIFT;
     const struct trc_shadow_rays rays = {
         .o = {a->o.x, a->o.y, a->o.z},
@@ -33,7 +33,7 @@ static void found_push(struct trc_tile *t, const struct arrival *a, vvec3 radian
         .time = a->time,
         .radiance = {c.x, c.y, c.z},
         .slot = a->slot,
-        .path = (a->path & vu_set(~TRC_PATH_FEATURES)) | path,
+        .path = (a->path & vu_set(~(TRC_PATH_FEATURES | TRC_PATH_KIND))) | path,
         .target = (vuint)light * vu_set(TRC_DIRECTION_CELLS) + trc_direction_cell(a->d),
         .depths = a->depths,
     };

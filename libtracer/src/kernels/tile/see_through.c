@@ -15,6 +15,28 @@ static __attribute__((noinline)) vfloat pixel_of(const struct trc_shadow_store *
                : pixel;
 }
 
+/* 1 in lanes whose path word has that bit, else 0. */
+static vint has_bit(vuint path, uint32_t bit) {
+    return vi_select(vi_eq((vint)(path & vu_set(bit)), vi_set(0)), vi_set(0), vi_set(1));
+}
+
+/* What Light Path tells of the rays at order: as many bounces as those of the path, and one, which
+ * counts among its kind where they stand for rays of lobes. */
+static void path_load(const struct trc_shadow_store *q, vint order, struct trc_surface *s) {
+    const vuint path = vu_gather(q->path, order, s->active);
+    const vuint depths = vu_gather(q->depths, order, s->active);
+    const vint transmitted = has_bit(path, TRC_VISIBLE_TRANSMISSION);
+    s->path = path;
+    s->depth = (vint)trc_depth_of(depths, TRC_DEPTH_ALL_SHIFT) + vi_set(1);
+    s->diffuse_depth =
+        vi_select(vi_eq(transmitted, vi_set(0)), has_bit(path, TRC_VISIBLE_DIFFUSE), vi_set(0));
+    s->glossy_depth =
+        (vint)trc_depth_of(depths, TRC_DEPTH_GLOSSY_SHIFT) + has_bit(path, TRC_VISIBLE_GLOSSY);
+    s->transmission_depth = (vint)trc_depth_of(depths, TRC_DEPTH_TRANSMISSION_SHIFT) + transmitted;
+    s->transparent_depth = (vint)trc_depth_of(depths, TRC_DEPTH_TRANSPARENT_SHIFT) +
+                           (vint)vu_gather(q->passed, order, s->active);
+}
+
 /* What the surfaces that the lanes' rays meet let through; 0 where a material is opaque to shadows.
  * order: of the rays. */
 static vvec3 surface_transparency(const struct trc_tile *t, const struct trc_packet *p,
@@ -48,13 +70,11 @@ static vvec3 surface_transparency(const struct trc_tile *t, const struct trc_pac
         s.time = t->object_motion ? vf_load(&p->time[i]) : vf_set(0.0f);
         const vvec3 d = v3(vf_load(&p->d[0][i]), vf_load(&p->d[1][i]), vf_load(&p->d[2][i]));
         s.wo = v3_normalize(v3_neg(d));
-        s.path = vu_set(TRC_VISIBLE_SHADOW);
-        s.ray_length = vf_load(&p->t[i]);
-        s.depth = s.diffuse_depth = s.glossy_depth = s.transmission_depth = s.transparent_depth =
-            vi_set(0);
+        s.ray_length = vf_load(&p->t[i]) * v3_length(d); /* those to lamps end at 1 */
+        path_load(&t->shadows, order, &s);
         s.footprint = s.pixel = s.raster_x = s.raster_y = vf_set(0.0f);
         if (t->shadows.pixel)
-            s.pixel = pixel_of(&t->shadows, m, order, v3_length(d) * s.ray_length, s.active);
+            s.pixel = pixel_of(&t->shadows, m, order, s.ray_length, s.active);
         trc_surface_fetch(&s);
         if (m->instruction_count)
             trc_program_run(m, &s, &regs);

@@ -89,6 +89,7 @@ struct light_result {
     vfloat alpha2; /* mean square alpha of the lobes of glossy and transmission; read where shadow
                       rays know of pixels */
     vmask is_blocked; /* by what is in the way, other samples by nothing */
+    vuint kind;       /* of the rays, TRC_PATH_KIND */
 };
 
 void trc_direct_light(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,

@@ -129,6 +129,31 @@ static uint32_t unblocked_last(struct trc_tile *t) {
     return others;
 }
 
+/* Traces the rays [begin, end) of the order. blockers: what is in the way of shadow rays; in that of
+ * rays that stand for those of lobes is what these see. shift: where the bits of both stand. */
+static void lit_trace(struct trc_tile *t, uint32_t begin, uint32_t end, uint32_t blockers,
+                      uint32_t shift) {
+    struct trc_shadow_store *q = &t->shadows;
+    if (!(t->snapshot->features & TRC_FEATURE_RAY_KINDS)) {
+        rays_trace(t, begin, end, blockers << shift);
+        return;
+    }
+    while (begin < end) {
+        const uint32_t kind = trc_ray_visibility(q->path[q->order[begin]]);
+        uint32_t same = begin, others = 0;
+        for (uint32_t i = begin; i < end; i++) {
+            const uint32_t ray = q->order[i];
+            if (trc_ray_visibility(q->path[ray]) == kind)
+                q->order[same++] = ray;
+            else
+                t->keys[others++] = ray;
+        }
+        memcpy(q->order + same, t->keys, others * sizeof *q->order);
+        rays_trace(t, begin, same, (kind == TRC_VISIBLE_SHADOW ? blockers : kind) << shift);
+        begin = same;
+    }
+}
+
 /* What blocks rays whose path words have that shadow class and TRC_PATH_FOUND, class by class. */
 static uint32_t blockers(uint32_t kind) {
     const uint32_t class = kind >> 1, is_found = kind & 1;
@@ -153,7 +178,7 @@ static void kinds_trace(struct trc_tile *t, uint32_t count) {
                 t->keys[others++] = ray;
         }
         memcpy(q->order + end, t->keys, others * sizeof *q->order);
-        rays_trace(t, begin, end, blockers(kind));
+        lit_trace(t, begin, end, blockers(kind), 0);
         begin = end;
     }
 }
@@ -171,8 +196,8 @@ void trc_shadow_flush(struct trc_tile *t) {
     if (t->snapshot->shadow_class_count)
         kinds_trace(t, blocked);
     else
-        rays_trace(t, 0, blocked, TRC_VISIBLE_SHADOW);
-    rays_trace(t, blocked, q->count, TRC_VISIBLE_SHADOW << TRC_UNBLOCKED_SHIFT);
+        lit_trace(t, 0, blocked, TRC_VISIBLE_SHADOW, 0);
+    lit_trace(t, blocked, q->count, TRC_VISIBLE_SHADOW, TRC_UNBLOCKED_SHIFT);
     if (trc_clamps(t->desc))
         light_clamp(t);
     if (t->occlusion_passes)

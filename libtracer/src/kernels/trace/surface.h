@@ -17,6 +17,19 @@ enum {
 };
 #define TRC_PATH_PORTALS 7u
 
+/* Those that tell what lobe or light sample sent a ray. */
+#define TRC_PATH_KIND ((uint32_t)(TRC_VISIBLE_ALL | TRC_PATH_SINGULAR | TRC_PATH_REFLECTED))
+
+/* The kinds of rays that rough lobes send: matt ones (through the surface in the lanes of behind),
+ * glossy ones, and those that transmit. */
+TRC_INLINE void trc_lobe_rays(vmask behind, vuint kinds_out[3]) {
+    const vint matt = vi_select(behind, vi_set(TRC_VISIBLE_DIFFUSE | TRC_VISIBLE_TRANSMISSION),
+                                vi_set(TRC_VISIBLE_DIFFUSE | TRC_PATH_REFLECTED));
+    kinds_out[0] = (vuint)matt;
+    kinds_out[1] = vu_set(TRC_VISIBLE_GLOSSY | TRC_PATH_REFLECTED);
+    kinds_out[2] = vu_set(TRC_VISIBLE_TRANSMISSION);
+}
+
 /* In place of an instance's number: a world lookup, and the first lamp, below which others follow.
  */
 enum { TRC_WORLD_LOOKUP = -1, TRC_FIRST_LAMP = -2 };
