@@ -17,14 +17,13 @@ _MODULES = (render, view_layer, objects, camera, shading, view)
 _SHARED_PANELS = {
     "DATA_PT_camera_dof", "DATA_PT_camera_dof_aperture", "DATA_PT_preview", "MATERIAL_PT_preview",
     "EEVEE_MATERIAL_PT_context_material", "TEXTURE_PT_preview",
-    "VIEW3D_PT_shading_lighting",
 }
 # Panels made for Blender's internal engine that show what this one does not have, or has itself.
 _LEFT_OUT_PANELS = {
     "DATA_PT_area", "DATA_PT_falloff_curve", "DATA_PT_light", "DATA_PT_spot", "NODE_DATA_PT_light",
     "NODE_DATA_PT_spot", "OBJECT_PT_visibility", "VIEWLAYER_PT_filter", "VIEWLAYER_PT_layer_passes",
-    "RENDER_PT_post_processing", "RENDER_PT_simplify", "RENDER_PT_simplify_viewport",
-    "RENDER_PT_simplify_render", "RENDER_PT_simplify_greasepencil",
+    "RENDER_PT_simplify", "RENDER_PT_simplify_viewport", "RENDER_PT_simplify_render",
+    "RENDER_PT_simplify_greasepencil",
 }
 
 

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Panels of objects."""
 
+import bpy
 from bpy.types import Panel
 
 from ..compat import shadow_terminator_settings
-from .panel import VolleyPanel, column_of, draw_light_group
+from .panel import VolleyPanel, column_of, draw_light_group, prop_if_present
 
 
 _SHAPED = {'MESH', 'CURVE', 'SURFACE', 'FONT', 'META', 'CURVES', 'POINTCLOUD'}
@@ -36,6 +37,8 @@ class VOLLEY_OBJECT_PT_visibility(_ObjectPanel, Panel):
     def draw(self, context):
         layout, active = column_of(self, has_keys=True), context.object
         layout.prop(active, "hide_select", text="Selectable", invert_checkbox=True, toggle=False)
+        prop_if_present(layout, active, "hide_surface_pick", text="Surface Picking", invert_checkbox=True,
+                        toggle=False)
         column = layout.column(heading="Show In")
         column.prop(active, "hide_viewport", text="Viewports", invert_checkbox=True, toggle=False)
         column.prop(active, "hide_render", text="Renders", invert_checkbox=True, toggle=False)
@@ -84,16 +87,21 @@ class _ShadingPanel(_ObjectPanel):
         return super().poll(context) and _has_shape(context.object) and hasattr(context.object, "cycles")
 
 
-class VOLLEY_OBJECT_PT_shading(_ShadingPanel, Panel):
-    bl_label = "Shading"
+if hasattr(bpy.types, "OBJECT_PT_shading"):  # with Light Linking in it; seen in 4.3, not in 3.4
+    _SHADING_PANEL = "OBJECT_PT_shading"
+else:
+    _SHADING_PANEL = "VOLLEY_OBJECT_PT_shading"
 
-    def draw(self, context):
-        pass
+    class VOLLEY_OBJECT_PT_shading(_ShadingPanel, Panel):
+        bl_label = "Shading"
+
+        def draw(self, context):
+            pass
 
 
 class VOLLEY_OBJECT_PT_shadow_terminator(_ShadingPanel, Panel):
     bl_label = "Shadow Terminator"
-    bl_parent_id = "VOLLEY_OBJECT_PT_shading"
+    bl_parent_id = _SHADING_PANEL
 
     def draw(self, context):
         column, active = column_of(self).column(align=True), context.object
@@ -104,12 +112,34 @@ class VOLLEY_OBJECT_PT_shadow_terminator(_ShadingPanel, Panel):
 
 class VOLLEY_OBJECT_PT_fast_gi(_ShadingPanel, Panel):
     bl_label = "Ambient Occlusion"
-    bl_parent_id = "VOLLEY_OBJECT_PT_shading"
+    bl_parent_id = _SHADING_PANEL
 
     def draw(self, context):
         column, settings = column_of(self).column(), context.scene.volley
         column.active = settings.use_ambient_occlusion and settings.ao_method == 'REPLACE'
         column.prop(context.object.cycles, "ao_distance", text="AO Distance")
+
+
+class VOLLEY_OBJECT_PT_subdivision(_ShadingPanel, Panel):
+    """Blender has this in the modifier: before 5.0 for Cycles alone."""
+
+    bl_label = "Adaptive Subdivision"
+    bl_parent_id = _SHADING_PANEL
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and hasattr(context.object.cycles, "use_adaptive_subdivision") \
+            and any(modifier.type == 'SUBSURF' for modifier in context.object.modifiers)
+
+    def draw_header(self, context):
+        self.layout.prop(context.object.cycles, "use_adaptive_subdivision", text="")
+
+    def draw(self, context):
+        column, settings = column_of(self).column(), context.object.cycles
+        column.active = settings.use_adaptive_subdivision
+        column.prop(settings, "dicing_rate")
+        if context.scene.cycles.feature_set != 'EXPERIMENTAL':
+            column.label(text="Needs Experimental in the Subdivision panel of the render", icon='INFO')
 
 
 class VOLLEY_OBJECT_PT_motion_blur(_ObjectPanel, Panel):

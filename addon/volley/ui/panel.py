@@ -19,6 +19,14 @@ class VolleyPanel:
             cls.needs is None or bool(getattr(context, cls.needs, None)))
 
 
+class NodeEditorPanel:
+    """Put before what a panel of the Properties editor is made of: the same beside the node editor's tree."""
+
+    bl_space_type = 'NODE_EDITOR'
+    bl_region_type = 'UI'
+    bl_category = "Options"
+
+
 def column_of(panel, has_keys=False):
     """The panel's layout in Blender's two-column style; has_keys: with a dot to animate each property."""
     layout = panel.layout

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Panels of render properties."""
 
+from bl_ui import properties_render
 from bl_ui.properties_grease_pencil_common import GreasePencilSimplifyPanel
 from bpy.types import Panel
 
 from .. import denoise_nodes, from_cycles, presets
-from ..compat import motion_position
+from ..compat import SUBDIVIDES_CAGE, motion_position
 from ..farm.operator import VOLLEY_OT_merge_parts
 from .panel import VolleyPanel, column_of
 
@@ -138,6 +139,30 @@ class VOLLEY_RENDER_PT_ambient_occlusion(VolleyPanel, Panel):
             column.prop(scene.world.light_settings, "distance", text="AO Distance")
 
 
+class VOLLEY_RENDER_PT_subdivision(VolleyPanel, Panel):
+    """Its settings are Cycles'."""
+
+    bl_label = "Subdivision"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and hasattr(context.scene, "cycles")
+
+    def draw(self, context):
+        column, settings = column_of(self).column(), context.scene.cycles
+        if not SUBDIVIDES_CAGE:
+            column.prop(settings, "feature_set")
+            column = column.column()
+            column.active = settings.feature_set == 'EXPERIMENTAL'
+        rates = column.column(align=True)
+        rates.prop(settings, "dicing_rate", text="Dicing Rate Render")
+        rates.prop(settings, "preview_dicing_rate", text="Viewport")
+        column.prop(settings, "offscreen_dicing_scale", text="Offscreen Scale")
+        column.prop(settings, "max_subdivisions")
+        column.prop(settings, "dicing_camera")
+
+
 class VOLLEY_RENDER_PT_curves(VolleyPanel, Panel):
     bl_label = "Curves"
     bl_options = {'DEFAULT_CLOSED'}
@@ -152,6 +177,13 @@ class VOLLEY_RENDER_PT_curves(VolleyPanel, Panel):
         layout.prop(settings, "shape", text="Shape")
         if settings.shape == 'RIBBONS':
             layout.prop(settings, "subdivisions", text="Curve Subdivisions")
+
+
+class VOLLEY_RENDER_PT_curves_viewport_display(VolleyPanel, Panel):
+    bl_label = "Viewport Display"
+    bl_parent_id = "VOLLEY_RENDER_PT_curves"
+    bl_options = {'DEFAULT_CLOSED'}
+    draw = properties_render.draw_curves_settings
 
 
 class VOLLEY_RENDER_PT_simplify(VolleyPanel, Panel):
@@ -342,3 +374,18 @@ class VOLLEY_RENDER_PT_performance_final(VolleyPanel, Panel):
 
     def draw(self, context):
         column_of(self).prop(context.scene.render, "use_persistent_data", text="Persistent Data")
+
+
+if hasattr(properties_render, "CompositorPerformanceButtonsPanel"):  # seen in 4.3, not in 3.4
+    class VOLLEY_RENDER_PT_performance_compositor(
+            VolleyPanel, properties_render.CompositorPerformanceButtonsPanel, Panel):
+        bl_label = "Compositor"
+        bl_parent_id = "VOLLEY_RENDER_PT_performance"
+        bl_options = {'DEFAULT_CLOSED'}
+
+if hasattr(properties_render, "CompositorDenoisePerformanceButtonsPanel"):
+    class VOLLEY_RENDER_PT_performance_compositor_denoise(
+            VolleyPanel, properties_render.CompositorDenoisePerformanceButtonsPanel, Panel):
+        bl_label = "Denoise Nodes"
+        bl_parent_id = "VOLLEY_RENDER_PT_performance_compositor"
+        bl_options = {'DEFAULT_CLOSED'}

@@ -3,7 +3,7 @@
 
 from bpy.types import Panel
 
-from .panel import VolleyPanel, column_of, draw_light_group, prop_if_present
+from .panel import NodeEditorPanel, VolleyPanel, column_of, draw_light_group, prop_if_present
 
 
 class _LightPanel(VolleyPanel):
@@ -31,18 +31,22 @@ def _draw_surface(panel, data):
     if hasattr(data, "use_nodes") and (not data.use_nodes or data.node_tree is None):
         layout.prop(data, "use_nodes", icon='NODETREE', toggle=True)  # nameless where properties are split
         return False
-    layout.use_property_split = True
-    tree = data.node_tree
-    output = tree.get_output_node('CYCLES') if tree is not None else None
-    surface = output.inputs.get("Surface") if output is not None else None
-    if surface is None:
-        layout.label(text="No output node")
-    else:
-        layout.template_node_view(tree, output, surface)
+    _draw_input(layout, data.node_tree, "Surface")
     return True
 
 
-class VOLLEY_LIGHT_PT_light(_LightPanel, Panel):
+def _draw_input(layout, tree, name):
+    """What an input of a tree's output is linked to."""
+    layout.use_property_split = True
+    output = tree.get_output_node('CYCLES') if tree is not None else None
+    socket = output.inputs.get(name) if output is not None else None
+    if socket is None:
+        layout.label(text="No output node")
+    else:
+        layout.template_node_view(tree, output, socket)
+
+
+class _Light(_LightPanel):
     bl_label = "Light"
 
     def draw(self, context):
@@ -56,6 +60,7 @@ class VOLLEY_LIGHT_PT_light(_LightPanel, Panel):
             column.prop(light, "temperature")
         column.prop(light, "energy", text="Strength" if light.type == 'SUN' else "Power")
         prop_if_present(column, light, "exposure")
+        prop_if_present(column, light, "normalize")
         column.separator()
         self._draw_shape(column, light)
         column.separator()
@@ -66,6 +71,9 @@ class VOLLEY_LIGHT_PT_light(_LightPanel, Panel):
             prop_if_present(column, settings, "cast_shadow")
         prop_if_present(column, settings, "use_multiple_importance_sampling",
                          text="Multiple Importance")
+        prop_if_present(column, settings, "max_bounces")
+        if light.type == 'AREA':
+            prop_if_present(column, settings, "is_portal", text="Portal")
 
     @staticmethod
     def _draw_shape(column, light):
@@ -84,9 +92,16 @@ class VOLLEY_LIGHT_PT_light(_LightPanel, Panel):
                 sub.prop(light, "size_y", text="Y")
 
 
-class VOLLEY_LIGHT_PT_beam_shape(_LightPanel, Panel):
+class VOLLEY_LIGHT_PT_light(_Light, Panel):
+    pass
+
+
+class VOLLEY_NODE_PT_light(NodeEditorPanel, _Light, Panel):
+    pass
+
+
+class _BeamShape(_LightPanel):
     bl_label = "Beam Shape"
-    bl_parent_id = "VOLLEY_LIGHT_PT_light"
 
     @classmethod
     def poll(cls, context):
@@ -100,6 +115,14 @@ class VOLLEY_LIGHT_PT_beam_shape(_LightPanel, Panel):
             column.prop(light, "show_cone")
         else:
             column.prop(light, "spread", text="Spread")
+
+
+class VOLLEY_LIGHT_PT_beam_shape(_BeamShape, Panel):
+    bl_parent_id = "VOLLEY_LIGHT_PT_light"
+
+
+class VOLLEY_NODE_PT_beam_shape(NodeEditorPanel, _BeamShape, Panel):
+    bl_parent_id = "VOLLEY_NODE_PT_light"
 
 
 class VOLLEY_LIGHT_PT_nodes(_LightPanel, Panel):
@@ -141,7 +164,7 @@ class VOLLEY_WORLD_PT_mist(_WorldPanel, Panel):
         layout.prop(settings, "falloff")
 
 
-class VOLLEY_WORLD_PT_ray_visibility(_WorldPanel, Panel):
+class _WorldRayVisibility(_WorldPanel):
     bl_label = "Ray Visibility"
     bl_options = {'DEFAULT_CLOSED'}
 
@@ -155,7 +178,15 @@ class VOLLEY_WORLD_PT_ray_visibility(_WorldPanel, Panel):
             column.prop(context.world.cycles_visibility, name)
 
 
-class VOLLEY_WORLD_PT_settings(_WorldPanel, Panel):
+class VOLLEY_WORLD_PT_ray_visibility(_WorldRayVisibility, Panel):
+    pass
+
+
+class VOLLEY_NODE_PT_world_ray_visibility(NodeEditorPanel, _WorldRayVisibility, Panel):
+    pass
+
+
+class _WorldSettings(_WorldPanel):
     bl_label = "Settings"
     bl_options = {'DEFAULT_CLOSED'}
 
@@ -169,6 +200,14 @@ class VOLLEY_WORLD_PT_settings(_WorldPanel, Panel):
         if settings.sampling_method == 'MANUAL':
             column.prop(settings, "sample_map_resolution")
         prop_if_present(column, settings, "use_shadows", text="Cast Shadow")
+
+
+class VOLLEY_WORLD_PT_settings(_WorldSettings, Panel):
+    pass
+
+
+class VOLLEY_NODE_PT_world_settings(NodeEditorPanel, _WorldSettings, Panel):
+    pass
 
 
 class VOLLEY_WORLD_PT_lightgroup(_WorldPanel, Panel):
@@ -187,7 +226,18 @@ class VOLLEY_MATERIAL_PT_surface(_MaterialPanel, Panel):
             self.layout.prop(context.material, "diffuse_color")
 
 
-class VOLLEY_MATERIAL_PT_settings(_MaterialPanel, Panel):
+class VOLLEY_MATERIAL_PT_displacement(_MaterialPanel, Panel):
+    bl_label = "Displacement"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.material.node_tree is not None
+
+    def draw(self, context):
+        _draw_input(self.layout, context.material.node_tree, "Displacement")
+
+
+class _MaterialSettings(_MaterialPanel):
     bl_label = "Settings"
     bl_options = {'DEFAULT_CLOSED'}
 
@@ -195,9 +245,19 @@ class VOLLEY_MATERIAL_PT_settings(_MaterialPanel, Panel):
         material, column = context.material, column_of(self).column()
         column.prop(material, "pass_index")
         settings = getattr(material, "cycles", None)
+        owner = material if hasattr(material, "displacement_method") else settings
+        prop_if_present(column, owner, "displacement_method", text="Displacement")
         if hasattr(material, "use_transparent_shadow"):
             column.prop(material, "use_transparent_shadow", text="Transparent Shadows")
         else:
             prop_if_present(column, settings, "use_transparent_shadow", text="Transparent Shadows")
         prop_if_present(column, settings, "sample_as_light", text="Multiple Importance")
         prop_if_present(column, settings, "emission_sampling")
+
+
+class VOLLEY_MATERIAL_PT_settings(_MaterialSettings, Panel):
+    pass
+
+
+class VOLLEY_NODE_PT_material_settings(NodeEditorPanel, _MaterialSettings, Panel):
+    pass

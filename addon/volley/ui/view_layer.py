@@ -23,6 +23,7 @@ class VOLLEY_VIEWLAYER_PT_filter(_ViewLayerPanel, Panel):
         column = column_of(self).column(heading="Include")
         column.prop(context.view_layer, "use_sky", text="Environment")
         column.prop(context.view_layer, "use_solid", text="Surfaces")
+        column.prop(context.view_layer, "use_strand", text="Curves")
         motion = column.column()
         motion.active = context.scene.render.use_motion_blur
         motion.prop(context.view_layer, "use_motion_blur", text="Motion Blur")
