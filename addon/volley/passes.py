@@ -150,11 +150,11 @@ def register_passes(engine, scene, view_layer):
                              kind_of(entry))
 
 
-def add_to_result(engine, entries):
-    """Make room in the render result for all passes but Blender's own Combined."""
+def add_to_result(engine, entries, layer_name):
+    """Make room in the render result's layer of that name for all passes but Blender's own Combined."""
     for entry in entries:
         if entry is not COMBINED:
-            engine.add_pass(name_of(entry), len(entry.channels), entry.channels)
+            engine.add_pass(name_of(entry), len(entry.channels), entry.channels, layer=layer_name)
 
 
 def without_vector(entries):

@@ -57,7 +57,7 @@ class Session:
         scene = depsgraph.scene_eval
         view_layer = depsgraph.view_layer_eval
         entries = passes.enabled(view_layer)
-        passes.add_to_result(engine, entries)
+        passes.add_to_result(engine, entries, view_layer.name)
         film = engine.get_result()
         frame = camera.frame_of(scene.render, (engine.resolution_x, engine.resolution_y))
         crop = _fit_crop(camera.crop_of(scene.render, frame), (film.resolution_x, film.resolution_y))
