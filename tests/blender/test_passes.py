@@ -310,6 +310,7 @@ def test_transparent_film(blender, has_environment):
 def inside_mist():
     import bpy
     import pass_scenes
+    import scenes
     scene = pass_scenes.gallery()
     layer = bpy.context.view_layer
     layer.use_pass_mist = True
@@ -323,10 +324,17 @@ def inside_mist():
     pairs["orthographic, with misses"] = _both(["Mist"])["Mist"]
     mist.depth = 0.0
     pairs["no depth"] = _both(["Mist"])["Mist"]
+    mist.depth = 12.0
+    scene.render.film_transparent = scene.cycles.film_transparent_glass = scene.volley.film_transparent_glass = True
+    glass = scenes.material("Clear", "ShaderNodeBsdfGlass", Color=(0.9, 0.8, 0.9), Roughness=0.0, IOR=1.2)
+    bpy.data.objects["Metal"].data.materials[0] = glass
+    pairs["through clear glass"] = _both(["Mist"])["Mist"]
     return pairs
 
 
 def test_mist(blender):
+    """Glass that a transparent film is seen through counts beside what is behind it, but Mist ends at 0: it was
+    down to -1 in a ball."""
     for name, (ours, theirs) in blender.run(inside_mist).items():
         _agree(ours, theirs, name, channels=1)
         assert 0.0 <= ours.min() and ours.max() <= 1.0, name

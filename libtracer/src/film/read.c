@@ -83,17 +83,19 @@ static void read_counts(const struct reading *r, struct row row) {
         r->out[i] = (float)load_count(r->film, i);
 }
 
-/* How much of a pixel the picture covers, of the sum of so many samples. What is transparent by
- * more than white, of which the sum tells less than nothing, covers nothing, as in Cycles. */
+/* How much of a pixel the picture covers, or mist does, of the sum of so many samples. What is
+ * transparent by more than white, of which the sum tells less than nothing, covers nothing, as in
+ * Cycles; nor is there mist where glass counts that the film is transparent through, and what is
+ * behind it again. */
 static double coverage(double sum, double count) { return fmin(fmax(sum / count, 0.0), 1.0); }
 
 /* Passes that are sums or values of samples. Light is divided by its colour as Cycles divides it.
  */
 static void read_sums(const struct reading *r, struct row row) {
     const enum trc_pass_kind kind = r->info->kind;
-    const bool has_alpha = r->pass == TRC_PASS_COMBINED;
+    const bool has_coverage = r->pass == TRC_PASS_COMBINED || r->pass == TRC_PASS_MIST;
     const uint32_t channels = r->info->channels, stride = r->info->sums;
-    const uint32_t plain = has_alpha ? channels - 1 : channels;
+    const uint32_t plain = has_coverage ? channels - 1 : channels; /* which is the last channel */
     const double *sums = sums_of(r, r->pass);
     const double *divisor = r->info->color != TRC_PASS_NONE ? sums_of(r, r->info->color) : NULL;
     const double light = kind == TRC_PASS_KIND_LIGHT ? r->exposure : 1.0;
@@ -113,8 +115,9 @@ static void read_sums(const struct reading *r, struct row row) {
             }
             pixel[c] = count ? to_float(value * factor * light) : 0.0f;
         }
-        if (has_alpha)
-            pixel[3] = count ? (float)coverage(trc_sum_load(&sums[i * stride + 3]), count) : 0.0f;
+        if (has_coverage)
+            pixel[plain] =
+                count ? (float)coverage(trc_sum_load(&sums[i * stride + plain]), count) : 0.0f;
     }
 }
 
