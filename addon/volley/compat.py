@@ -132,6 +132,10 @@ HAS_BLENDERS_ATTRIBUTES = bpy.app.version >= (4, 1, 0)
 # Fewer names of attributes stand for what Cycles knows of a mesh; seen in 5.2, not in 4.3.
 HAS_FEW_STANDARD_ATTRIBUTES = bpy.app.version >= (5, 0, 0)
 
+# Where a mesh has no UV map, tangents are those of longitudes without a seam, and of the deformed mesh; seen in 5.2,
+# not in 4.3.
+UNWRAPS_LONGITUDES = bpy.app.version >= (5, 0, 0)
+
 # The Color Attribute node makes no bumps, other than the Attribute node; seen in 5.2, not in 4.3.
 LEVELS_COLOR_BUMPS = bpy.app.version >= (5, 0, 0)
 

@@ -87,6 +87,54 @@ def inside_tangents():
     return pictures
 
 
+def _without_map(shape):
+    """An object of that name without a UV map."""
+    import bpy
+    import scenes
+    if shape == "floor":
+        return scenes.mesh("Floor", [(-1, -1, -0.3), (1, -1, -0.3), (1, 1, 0.5), (-1, 1, 0.5)], [(0, 1, 2, 3)])
+    if shape == "text":
+        bpy.ops.object.text_add(location=(-0.8, 0.0, 0.0), rotation=(1.3, 0.2, 0.3))
+        bpy.context.object.data.extrude = 0.1
+        return bpy.context.object
+    if shape == "cube":
+        bpy.ops.mesh.primitive_cube_add(size=1.2, rotation=(0.5, 0.3, 0.2))
+        made = bpy.context.object
+    else:
+        made = _unwrapped("sphere")
+        made.scale = (1.0, 1.0, 1.0)
+    made.data.uv_layers.remove(made.data.uv_layers[0])
+    if shape == "bent":
+        made.shape_key_add(name="Basis")
+        key = made.shape_key_add(name="Bent")
+        key.value = 1.0
+        for point in key.data:
+            x, y, z = point.co
+            point.co = (1.1 * x + 0.3 * z * z, y, 0.8 * z + 0.2 * x)
+    return made
+
+
+WITHOUT_MAP = ("floor", "cube", "text", "ball", "bent")
+NO_MAP_WITHIN = 0.98  # of the pixels: around the poles of balls those of Blender 5 are others
+
+
+def inside_without_map():
+    """{name: [by Volley, by Cycles]}"""
+    import scenes
+    pictures = {}
+    for shape in WITHOUT_MAP:
+        scenes.empty(size=(SIZE, SIZE))
+        scenes.camera(location=(0.0, -6.0, 0.0), type='ORTHO', ortho_scale=2.6)
+        scenes.sharpen()
+        made = _without_map(shape)
+        for kind, output, settings in (("ShaderNodeNormalMap", "Normal", {"Color": (0.8, 0.3, 0.7, 1.0)}),
+                                       ("ShaderNodeTangent", "Tangent", {"direction_type": 'UV_MAP'}),
+                                       ("ShaderNodeAttribute", "Vector", {"attribute_name": "tangent"})):
+            _show(made, kind, output, **settings)
+            pictures[f"{kind}, {shape}"] = scenes.by_both(1)
+    return pictures
+
+
 def inside_mikktspace():
     """{shape: largest distance from Blender's tangents, whether handedness is the same everywhere}"""
     import bpy
@@ -120,6 +168,14 @@ def test_against_cycles(blender):
         assert theirs[..., :3].std() > 0.1, f"{name}: the picture shows nothing"
         beyond = (np.abs(ours - theirs) > TOLERANCE).any(axis=-1).mean()
         assert beyond <= 1.0 - SHARE_WITHIN, f"{name}: {beyond:.3%} of the pixels differ"
+
+
+def test_without_map(blender):
+    """Longitudes stand in for UVs; Normal Map and Tangent nodes did nothing: no pixel was right."""
+    for name, (ours, theirs) in blender.run(inside_without_map).items():
+        shown = theirs[..., :3].any(axis=-1)
+        within = (np.abs(ours - theirs)[shown] <= TOLERANCE).all(axis=-1).mean()
+        assert within >= NO_MAP_WITHIN, f"{name}: {1.0 - within:.3%} of its pixels differ"
 
 
 def test_against_mikktspace(blender):

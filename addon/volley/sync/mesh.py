@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 
 from .. import abi, native
+from ..compat import UNWRAPS_LONGITUDES
 from . import derived, standard_attributes, tangents
 from .attribute_values import colors_at_vertices, colors_of, group_colors, is_pair, named_colors, widen
 
@@ -134,9 +135,7 @@ def generated_coordinates(blender_object, mesh, positions):
     """(vertices, 3) float32 of an evaluated object and the mesh that it shows: its undeformed mesh in the
     mesh's texture space, as Cycles has it. None where that is the bounding box of positions, the library's
     default."""
-    undeformed = positions
-    if _HAS_UNDEFORMED:
-        undeformed = _read(mesh.vertices, "undeformed_co", positions.shape, np.float32)
+    undeformed = _undeformed(mesh, positions)
     is_deformed = not np.array_equal(undeformed, positions)
     if not is_deformed:
         # A viewport's meshes do not keep it; the original has it if modifiers left its vertices.
@@ -148,8 +147,23 @@ def generated_coordinates(blender_object, mesh, positions):
     size = np.array(mesh.texspace_size, np.float32)
     if not is_deformed and _is_bounding_box(positions, location, size):
         return None
+    offset, scale = _texture_space(mesh)
+    return undeformed * scale - offset
+
+
+def _undeformed(mesh, positions):
+    """(vertices, 3) float32 of the mesh before modifiers and shape keys, where it keeps that."""
+    if not _HAS_UNDEFORMED:
+        return positions
+    return _read(mesh.vertices, "undeformed_co", positions.shape, np.float32)
+
+
+def _texture_space(mesh):
+    """What positions are scaled by for Generated coordinates, and what is taken off them then."""
+    location = np.array(mesh.texspace_location, np.float32)
+    size = np.array(mesh.texspace_size, np.float32)
     scale = np.divide(0.5, size, out=np.zeros_like(size), where=size != 0.0)
-    return undeformed * scale - (location * scale - np.float32(0.5))
+    return location * scale - np.float32(0.5), scale
 
 
 def _is_bounding_box(positions, location, size):
@@ -328,18 +342,40 @@ def _uv_values(layer, corner_count):
 
 
 def _tangent_layers(mesh, names):
-    """The UV maps whose tangents are among the names, by those."""
+    """The UV maps whose tangents are among the names, by those; None stands for _angles_around."""
     if not tangents.names_among(names):
         return {}
+    if not mesh.uv_layers:
+        return {tangents.attribute_name(""): None}
     layers = [(layer.name, layer) for layer in mesh.uv_layers]
     layers += [("", layer) for layer in mesh.uv_layers if layer.active_render]
     return {tangents.attribute_name(name): layer for name, layer in layers}
 
 
 def _tangents(mesh, data, layer, loops, tell=tangents.of_corners):
-    """What tell, a function of tangents, says of a UV map."""
-    uvs = _uv_values(layer, len(mesh.loops))[loops.of_triangles].reshape(-1, 3, 2)
-    return tell(data.positions[data.indices], _normals_of_corners(data), uvs)
+    """What tell, a function of tangents, says of a UV map; None: of _angles_around."""
+    if layer is None:
+        uvs = _angles_around(mesh, data)
+    else:
+        uvs = _uv_values(layer, len(mesh.loops))[loops.of_triangles].reshape(-1, 3, 2)
+    return tell(data.positions[data.indices], _normals_of_corners(data), uvs, layer is not None)
+
+
+def _angles_around(mesh, data):
+    """(triangles, 3, 2) float32: what Cycles takes for UVs where a mesh has none, longitudes and latitudes around its
+    origin; before Blender 5 of the undeformed mesh, with a seam. They are found by way of Generated coordinates, as
+    there: their rounding says on which side of the seam a vertex is."""
+    offset, scale = _texture_space(mesh)
+    positions = data.positions if UNWRAPS_LONGITUDES else _undeformed(mesh, data.positions)
+    x, y, z = ((positions * scale - offset + offset) / np.where(scale != 0.0, scale, np.float32(1.0))).T
+    length = np.sqrt(x * x + y * y + z * z)
+    up = np.divide(z, length, out=np.full_like(z, -1.0), where=length > 0.0).clip(-1.0, 1.0)
+    around = np.where((x != 0.0) | (y != 0.0), np.float32(0.5) - np.arctan2(x, y) / np.float32(2.0 * np.pi), 0.0)
+    uvs = np.stack([around, 1.0 - np.arccos(up) / np.float32(np.pi)], axis=1).astype(np.float32)[data.indices]
+    if UNWRAPS_LONGITUDES:
+        u = uvs[..., 0]
+        u += (u < 0.5) & (np.ptp(u, axis=1) > 0.5)[:, None]
+    return uvs
 
 
 def _normals_of_corners(data):
@@ -399,7 +435,7 @@ def _named_values(mesh, data, name, loops, group_names):
         layer = next((each for each in mesh.uv_layers if each.active_render), None)
         return None if layer is None else widen(_uv_values(layer, len(mesh.loops))[loops.of_triangles])
     layer = standard_attributes.map_of_tangents(mesh, name)
-    if layer is not None:
+    if layer is not None or name == standard_attributes.TANGENT and not mesh.uv_layers:
         return widen(_tangents(mesh, data, layer, loops, tangents.vectors_of_corners))
     return _attribute_values(mesh, name, loops, group_names)
 

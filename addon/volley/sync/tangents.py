@@ -13,6 +13,7 @@ import numpy as np
 _PREFIX = ".tangent "
 _MULTIPLIER = np.uint64(0x9E3779B97F4A7C15)  # odd, from the golden ratio (Knuth, TAOCP 6.4)
 _SHIFT = np.uint64(29)
+_WITHOUT_DIRECTION = (1.0, 0.0, 0.0)  # where U grows nowhere
 _LEVEL = 1e-3  # a normal nearer to the triangle's plane, as a sine, says nothing of directions in it
 
 
@@ -26,20 +27,21 @@ def names_among(names):
     return {name for name in names if name.startswith(_PREFIX)}
 
 
-def of_corners(points, normals, uvs):
+def of_corners(points, normals, uvs, has_seams=True):
     """(triangles * 3, 4) float32 of triangles' corners, (triangles, 3, ...) each: a and b with the tangent
     along a (p1 - p0) + b (p2 - p0), made perpendicular to the corner's normal; the handedness, 1 or -1; 0.
 
-    Told so, tangents go along with a triangle that is turned and stretched."""
-    return _coordinates(*_shared(points, normals, uvs))
+    Told so, tangents go along with a triangle that is turned and stretched. Without seams corners are alike whatever
+    their UVs."""
+    return _coordinates(*_shared(points, normals, uvs, has_seams))
 
 
-def vectors_of_corners(points, normals, uvs):
+def vectors_of_corners(points, normals, uvs, has_seams=True):
     """(triangles * 3, 3) float32 of the same: the tangents themselves, of unit length."""
-    return _shared(points, normals, uvs)[0].reshape(-1, 3).astype(np.float32)
+    return _shared(points, normals, uvs, has_seams)[0].reshape(-1, 3).astype(np.float32)
 
 
-def _shared(points, normals, uvs):
+def _shared(points, normals, uvs, has_seams):
     """What _coordinates takes: the tangents of corners that are alike as one."""
     points, uvs = points.astype(np.float64), uvs.astype(np.float64)
     sides = points[:, 1:] - points[:, :1]
@@ -47,9 +49,10 @@ def _shared(points, normals, uvs):
     sign = np.where(u1 * v2 - v1 * u2 > 0.0, 1.0, -1.0)
     along = (sides[:, 0] * v2[:, None] - sides[:, 1] * v1[:, None]) * sign[:, None]
     directions = _unit(_flattened(along[:, None], normals))
-    shared = _fans(_welded(points, normals, uvs, sign))
+    shared = _fans(_welded(points, normals, uvs if has_seams else np.zeros_like(uvs), sign))
     weighted = (directions * _angles(points, normals)[..., None]).reshape(-1, 3)
     tangents = _unit(np.stack([np.bincount(shared, part) for part in weighted.T], axis=1))[shared]
+    tangents[~tangents.any(axis=1)] = _WITHOUT_DIRECTION
     return tangents.reshape(points.shape), normals, sides, sign
 
 
