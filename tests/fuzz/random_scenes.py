@@ -7,10 +7,10 @@
 A line for each seed: errors of the picture and of light passes beyond noise, over the mean of the picture. A
 seed is the same scene in each Blender that has its nodes. Each part draws its numbers from a generator of its
 own, so that a scene without a part is mostly the same (without textures, normals or mixes other textures are
-drawn): what is wrong is found by leaving parts out. Light by kind must add up to the picture as it does in
-Cycles. --keep writes the scenes as .blend files and Volley | Cycles | 8 times the difference beside them. Ends
-with 1 if a mean differs by 1 % or a tile by 3 %, light does not add up, or a picture of Volley's is not finite.
-Takes a few seconds for each scene.
+drawn): what is wrong is found by leaving parts out. Those of wide_parts.py are in seeds from 20000 on alone. Light
+by kind must add up to the picture as it does in Cycles. --keep writes the scenes as .blend files and Volley |
+Cycles | 8 times the difference beside them. Ends with 1 if a mean differs by 1 % or a tile by 3 %, light does not
+add up, or a picture of Volley's is not finite. Takes a few seconds for each scene.
 """
 
 import argparse
@@ -20,11 +20,12 @@ import pathlib
 import random
 import sys
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
-import numpy as np  # noqa: E402  (the folder is on the path only now)
+sys.path[:0] = [str(pathlib.Path(__file__).resolve().parents[1] / "support"), str(pathlib.Path(__file__).parent)]
+import numpy as np  # noqa: E402  (the folders are on the path only now)
+import wide_parts as wide  # noqa: E402
 
 PARTS = ("textures", "normals", "mixes", "strands", "points", "instances", "motion", "deform", "shutter", "lens",
-         "world", "lamps", "lamp_nodes", "film", "objects", "passes", "guides", "rough_glass")
+         "world", "lamps", "lamp_nodes", "film", "objects", "passes", "guides", "rough_glass", *wide.PARTS)
 SIZE, SAMPLES = (64, 48), 512
 MEAN_TOLERANCE, TILE_TOLERANCE = 0.01, 0.03
 SUM_TOLERANCE = 0.002  # of the mean, by which light by kind may miss Combined by more than Cycles' does
@@ -36,7 +37,7 @@ PASSES = {"use_pass_diffuse_direct": "DiffDir", "use_pass_glossy_direct": "Gloss
           "use_pass_glossy_color": "GlossCol", "use_pass_transmission_color": "TransCol", "use_pass_mist": "Mist",
           "use_pass_normal": "Normal"}
 GUIDES = ("Denoising Albedo", "Denoising Normal")
-NO_LIGHT = (*GUIDES, "Normal")  # their errors are over their own means
+NO_LIGHT = (*GUIDES, "Normal", *wide.MORE_PASSES.values())  # their errors are over their own means
 
 
 class Scene:
@@ -52,6 +53,8 @@ class Scene:
         return self.generators[part]
 
     def has(self, part, chance):
+        if part in wide.PARTS and self.seed < wide.FIRST:
+            return False
         drawn = self.rng(part + "?").random() < chance
         return drawn and part not in self.without
 
@@ -117,6 +120,10 @@ def textured(scene, tree, socket):
     """A texture, mapped somehow, into a socket; heights of bumps without Window coordinates, along which those of
     Cycles 5 are turned."""
     import bpy
+    output = other_output(scene, tree, socket)
+    if output:
+        tree.links.new(output, socket)
+        return
     rng = scene.rng("textures")
     texture = new_node(tree, TEXTURES, rng)
     draw_settings(texture, rng)
@@ -134,7 +141,21 @@ def textured(scene, tree, socket):
         tree.links.new(mapping.outputs[0], texture.inputs["Vector"])
     # Positions are negative: Cycles lets negative light through what is transparent.
     outputs = [output for output in texture.outputs if output.enabled and output.name != "Position"]
-    tree.links.new(rng.choice(outputs), socket)
+    output = rng.choice(outputs)
+    if scene.has("chains", 0.3):
+        output = wide.chain(scene, tree, output)
+    tree.links.new(output, socket)
+
+
+def other_output(scene, tree, socket):
+    """What a socket may be linked to instead of a pattern, None without; of surfaces alone."""
+    if not any(node.bl_idname == "ShaderNodeOutputMaterial" for node in tree.nodes):
+        return None
+    if scene.has("images", 0.2):
+        return wide.image_texture(scene, tree)
+    if socket.name != "Height" and scene.has("sources", 0.25):
+        return wide.source(scene, tree)
+    return None
 
 
 def shader_node(scene, tree, kinds, rng):
@@ -157,7 +178,15 @@ def shader_node(scene, tree, kinds, rng):
     color = next((socket for socket in node.inputs if socket.type == 'RGBA' and socket.enabled), None)
     if color is not None and scene.has("textures", 0.7):
         textured(scene, tree, color)
-    if "Normal" in node.inputs and scene.has("normals", 0.4):
+    if node.bl_idname == "ShaderNodeBsdfPrincipled" and scene.has("emission", 0.15):
+        wide.draw_emission(scene, node)
+    for socket in node.inputs:
+        is_clear = socket.name == "Roughness" and socket.default_value == 0.0
+        if socket.name in wide.INPUTS and not is_clear and scene.has("inputs", 0.15):
+            textured(scene, tree, socket)
+    if "Normal" in node.inputs and scene.has("normal_maps", 0.15):
+        tree.links.new(wide.normal_map(scene, tree, textured), node.inputs["Normal"])
+    elif "Normal" in node.inputs and scene.has("normals", 0.4):
         bump = tree.nodes.new("ShaderNodeBump")
         bump.inputs["Strength"].default_value = scene.rng("normals").uniform(0.1, 0.6)
         bump.inputs["Distance"].default_value = 0.1
@@ -173,6 +202,7 @@ def material(scene, kinds, rng):
     made.use_nodes = True
     tree = made.node_tree
     tree.nodes.clear()
+    tree.nodes.new("ShaderNodeOutputMaterial").name = "Material Output"
     shader = shader_node(scene, tree, kinds, rng)
     if scene.has("mixes", 0.4):
         kind = scene.rng("mixes").choice(("ShaderNodeMixShader", "ShaderNodeAddShader"))
@@ -187,7 +217,9 @@ def material(scene, kinds, rng):
             if way:
                 tree.links.new(tree.nodes.new(way).outputs[0], mix.inputs["Fac"])
         shader = mix
-    tree.links.new(shader.outputs[0], tree.nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
+    tree.links.new(shader.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+    if kinds == SHADERS and scene.has("displacement", 0.2):
+        wide.add_displacement(scene, made, textured)
     return made
 
 
@@ -227,6 +259,8 @@ def add_objects(scene, rng):
             modifier = rng.choice((None, None, 'SUBSURF', 'BEVEL', 'ARRAY', 'SOLIDIFY', 'DECIMATE'))
             if modifier:
                 one.modifiers.new("Modifier", modifier)
+        if scene.seed >= wide.FIRST:
+            wide.change_object(scene, one, lambda: material(scene, SHADERS, scene.rng("slots")))
         made.append(one)
     return made
 
@@ -394,7 +428,7 @@ def set_shutter(rng):
 
 # Light and camera ------------------------------------------------------------------------------------
 
-def add_lamps(scene, rng):
+def add_lamps(scene, rng, made):
     import bpy
     import scenes
     for _ in range(rng.randint(1, 3)):
@@ -422,6 +456,7 @@ def add_lamps(scene, rng):
             setattr(lamp, rng.choice(("visible_diffuse", "visible_glossy", "visible_transmission")), False)
         if rng.random() < 0.2:
             lamp.scale = [rng.uniform(0.5, 1.5) for _ in range(3)]
+        wide.change_lamp(scene, lamp, made)
         bpy.context.view_layer.update()
 
 
@@ -480,6 +515,8 @@ def add_camera(scene):
             data.dof.use_dof, data.dof.focus_distance, data.dof.aperture_fstop = True, 5.5, 0.2
             data.dof.aperture_blades, data.dof.aperture_ratio = rng.choice((0, 5)), rng.choice((1.0, 2.0))
         data.clip_start = rng.choice((0.1, 5.5))
+    if scene.has("panorama", 0.2):
+        wide.change_camera(scene, made)
 
 
 def set_film(rng):
@@ -497,7 +534,7 @@ def set_film(rng):
 
 
 def build(seed, without):
-    """Make the scene of a seed; the passes that are compared besides."""
+    """Make the scene of a seed; the names of the passes that are compared, and limits of Cycles'."""
     import bpy
     import scenes
     scene = Scene(seed, without)
@@ -517,6 +554,12 @@ def build(seed, without):
         add_strands(scene, scene.rng("strands"), meshes[0])
     elif meshes and scene.has("points", 0.4):
         add_points(scene, scene.rng("points"), meshes[-1])
+    if meshes and made[0] is not meshes[-1] and scene.has("instancers", 0.25):
+        wide.add_instancer(scene, meshes[-1], made[0])
+    if scene.has("curves", 0.2):
+        wide.add_curves(scene, material(scene, HAIR_SHADERS, scene.rng("curves")))
+    if scene.has("catchers", 0.2):
+        floor.is_shadow_catcher = True
     if scene.has("deform", 0.4):
         add_deform(scene.rng("deform"), made)
     if scene.has("motion", 0.3):
@@ -526,7 +569,7 @@ def build(seed, without):
     if scene.has("world", 0.6):
         set_world(scene, scene.rng("world"))
     if "lamps" not in without:
-        add_lamps(scene, scene.rng("lamps"))
+        add_lamps(scene, scene.rng("lamps"), made)
     add_camera(scene)
     if scene.has("shutter", 0.3):
         set_shutter(scene.rng("shutter"))
@@ -543,8 +586,11 @@ def build(seed, without):
     if scene.has("guides", 0.4):
         layer.volley.denoising_store_passes = layer.cycles.denoising_store_passes = True
         names += GUIDES
+    names += wide.add_passes(scene)
+    if floor.is_shadow_catcher:  # of which Cycles has twice in other passes
+        names = ["Combined"]
     bpy.context.scene.frame_set(1)
-    return names
+    return names, wide.change_settings(scene)
 
 
 def inside(seed, without, folder):
@@ -552,10 +598,10 @@ def inside(seed, without, folder):
     import bpy
     import compare
     import scenes
-    names = build(seed, without)
+    names, limits = build(seed, without)
     if folder:
         bpy.ops.wm.save_as_mainfile(filepath=os.path.join(folder, f"{seed:04d}.blend"))
-    return scenes.passes_by_both(list(dict.fromkeys(names + compare.LIGHT_PASSES)), SAMPLES), names
+    return scenes.passes_by_both(list(dict.fromkeys(names + compare.LIGHT_PASSES)), SAMPLES, cycles=limits), names
 
 
 # Around Blender --------------------------------------------------------------------------------------
@@ -599,7 +645,7 @@ def measure(seed, options):
             pair = compare.side_by_side(*shown)
             compare.write_png(os.path.join(options.keep, f"{seed:04d}_{name}.png"), pair)
     rest, their_rest = (unsummed(pictures, side) / scale for side in (0, 1))
-    if rest > their_rest + SUM_TOLERANCE:
+    if rest > (1.0 + SUM_TOLERANCE) * their_rest + SUM_TOLERANCE:
         words.append(f"light by kind does not add up: {rest:.2%} (Cycles {their_rest:.2%})")
         worst = np.maximum(worst, 1.0)
     is_off = bool((worst > (MEAN_TOLERANCE, TILE_TOLERANCE)).any())

@@ -302,11 +302,14 @@ def by_both(samples):
     return pictures
 
 
-def each_seed(engine, samples, seeds=SEEDS):
-    """Set the scene up for an engine and one seed after the other; of so many samples altogether."""
+def each_seed(engine, samples, seeds=SEEDS, cycles=None):
+    """Set the scene up for an engine and one seed after the other; of so many samples altogether.
+    cycles: {name: value} of settings of Cycles' that are not as set_engine has them."""
     set_engine(engine, samples // len(seeds))
     if engine == 'CYCLES':
         independent_seeds()
+        for name, value in (cycles or {}).items():
+            setattr(bpy.context.scene.cycles, name, value)
     for seed in seeds:
         getattr(bpy.context.scene, engine.lower()).seed = seed
         yield seed
@@ -367,9 +370,9 @@ def show_light(layer):
     layer.use_pass_emit = layer.use_pass_environment = True
 
 
-def passes_by_both(names, samples, seeds=SEEDS):
-    """{pass name: as seeds_by_both} of the active view layer."""
-    sides = [[render_passes(names) for _ in each_seed(engine, samples, seeds)]
+def passes_by_both(names, samples, seeds=SEEDS, cycles=None):
+    """{pass name: as seeds_by_both} of the active view layer; cycles: see each_seed."""
+    sides = [[render_passes(names) for _ in each_seed(engine, samples, seeds, cycles)]
              for engine in ('VOLLEY', 'CYCLES')]
     return {name: [np.array([picture[name] for picture in side]) for side in sides] for name in names}
 
