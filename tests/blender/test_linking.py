@@ -49,6 +49,7 @@ CASES = {
     "instanced light alone": ("ALONE POINT", "diffuse", "+Ball", "-Ball"),
     "instanced mesh alone": ("ALONE_MESH POINT", "gloss", "-Floor", ""),
     "maker of a light": ("MADE POINT", "diffuse", "+Ball", "-Ball"),
+    "world": ("AREA POINT WORLD", "gloss", "-Floor", "-Ball"),  # where rays found the world it crashed
 }
 
 
@@ -145,6 +146,12 @@ def _build(lights, lobe, receivers, blockers):
             lamp.light_linking.receiver_collection = _collection(receivers)
         if blockers:
             lamp.light_linking.blocker_collection = _collection(blockers)
+    if "WORLD" in lights:
+        scenes.light_world((0.2, 0.3, 0.4))
+        tree = scene.world.node_tree
+        gradient = tree.nodes.new("ShaderNodeTexGradient")  # even worlds did not crash
+        tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"], gradient.inputs["Vector"])
+        tree.links.new(gradient.outputs[0], tree.nodes["Background"].inputs["Strength"])
     return scene
 
 

@@ -303,8 +303,9 @@ vfloat trc_light_triangle_weight(const struct trc_surface *s, vvec3 p_from, vvec
     return vf_select(m, ray_weight(bsdf_pdf, pdf * chance, light_sample_count), vf_one());
 }
 
-vvec3 trc_world_radiance(const struct trc_snapshot *snapshot, vvec3 p_from, vvec3 n_from, vvec3 wi,
-                         vfloat bsdf_pdf, vfloat light_sample_count, vuint path, vmask active) {
+vvec3 trc_world_radiance(const struct trc_snapshot *snapshot, vvec3 p_from, vvec3 n_from, vint left,
+                         vvec3 wi, vfloat bsdf_pdf, vfloat light_sample_count, vuint path,
+                         vmask active) {
     const struct trc_light_table *t = snapshot->lights;
     vmask m = active;
     const uint32_t visibility = snapshot->world.visibility;
@@ -321,7 +322,11 @@ vvec3 trc_world_radiance(const struct trc_snapshot *snapshot, vvec3 p_from, vvec
     const vmask weighed = vm_andnot(m, vm_or(alone, vf_lt(bsdf_pdf, vf_zero())));
     if (t->world_light == UINT32_MAX || !vm_any(weighed))
         return v3_where(m, radiance);
-    const struct trc_receiver receiver = trc_receiver_make(p_from, n_from);
+    struct trc_receiver receiver = trc_receiver_make(p_from, n_from);
+    vuint sets[2];
+    if (t->linked)
+        trc_receiver_sets(snapshot, left, weighed, sets);
+    receiver.sets = sets;
     const vfloat density = trc_world_density(t, n_from, receiver.has_n, wi, weighed);
     const vfloat chance = trc_light_chance(t, &receiver, vi_set((int32_t)t->world_light), weighed);
     const vfloat weight = ray_weight(bsdf_pdf, density * chance, light_sample_count);

@@ -101,9 +101,10 @@ vfloat trc_light_triangle_weight(const struct trc_surface *s, vvec3 p_from, vvec
 /* Numbers of the lanes' triangles as lights, -1 for those that are none. */
 vint trc_light_of_triangle(const struct trc_surface *s, vmask m);
 
-/* Radiance of the world in direction wi, MIS-weighted in the same way; 0 where the world is hidden
- * from rays of that path. */
-vvec3 trc_world_radiance(const struct trc_snapshot *snapshot, vvec3 p_from, vvec3 n_from, vvec3 wi,
-                         vfloat bsdf_pdf, vfloat light_sample_count, vuint path, vmask active);
+/* Radiance of the world in direction wi, MIS-weighted in the same way, left as there; 0 where the
+ * world is hidden from rays of that path. */
+vvec3 trc_world_radiance(const struct trc_snapshot *snapshot, vvec3 p_from, vvec3 n_from, vint left,
+                         vvec3 wi, vfloat bsdf_pdf, vfloat light_sample_count, vuint path,
+                         vmask active);
 
 #endif

@@ -125,8 +125,8 @@ void trc_emission_misses(struct trc_tile *t, const struct arrival *a, vmask miss
     }
     if (!(t->snapshot->features & TRC_FEATURE_ENVIRONMENT) || !vm_any(missed))
         return;
-    const vvec3 c = trc_world_radiance(t->snapshot, a->o, a->n_from, a->d, a->pdf,
-                                       light_count_before(t, a->depths), a->path, missed);
+    const vvec3 c = trc_world_radiance(t->snapshot, a->o, a->n_from, left_before(t, a), a->d,
+                                       a->pdf, light_count_before(t, a->depths), a->path, missed);
     const vvec3 added = light_of(t, a, c);
     found_add(t, a, vm_andnot(missed, clear), added, TRC_PASS_ENVIRONMENT);
     if (vm_any(clear))
