@@ -126,15 +126,23 @@ class Session:
                         aovs=passes.aov_numbers(depsgraph.view_layer_eval),
                         light_groups=passes.light_group_numbers(depsgraph.view_layer_eval))
         cameras = CameraMotion(engine, depsgraph, frame, shutter, view_names, self._sync.warnings)
-        try:
-            if moved and shutter.frame_at(motion.CENTER) != now:
-                engine.frame_set(*shutter.frame_at(motion.CENTER))
-                changes.note(depsgraph)
+        is_apart = moved and shutter.frame_at(motion.CENTER) != now
+
+        def look_at_center():
             cameras.look(motion.CENTER)
-            source.culling = culling.of(scene, next(iter(cameras.keys.values())))
-            source.dicing = dicing.Dicing(scene, next(iter(cameras.keys.values())), frame, True,
-                                          self._sync.warnings)
-            self._sync.update(source, shutter, cameras)
+            keys = next(iter(cameras.keys.values()))
+            source.culling = culling.of(scene, keys)
+            source.dicing = dicing.Dicing(scene, keys, frame, True, self._sync.warnings)
+
+        def go_to_center():
+            engine.frame_set(*shutter.frame_at(motion.CENTER))
+            changes.note(depsgraph)
+            look_at_center()
+
+        try:
+            if not is_apart:
+                look_at_center()
+            self._sync.update(source, shutter, cameras, go_to_center if is_apart else None)
         finally:
             if moved:
                 engine.frame_set(*now)

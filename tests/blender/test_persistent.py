@@ -146,6 +146,9 @@ def _animate(scene):
     _key(objects["Ball"], "color", [(x, 0.5, 0.2, 1.0) for x in (0.2, 0.6, 0.9, 0.4)])
     _key(objects["Light"].data, "energy", [300.0, 100.0, 500.0, 200.0])
     _key(scene.camera, "location", [(x, -9.0, 0.0) for x in (0.0, 0.2, 0.1, 0.3)])
+    lamp = scenes.light('POINT', (0.0, -4.0, -2.0), energy=50.0).data
+    lamp.use_nodes = True
+    _key(lamp.node_tree.nodes["Emission"].inputs["Strength"], "default_value", [1.0, 3.0, 2.0, 4.0])
     own = scenes.material("Own", "ShaderNodeBsdfDiffuse")
     colors = own.node_tree.nodes["Diffuse BSDF"].inputs["Color"]
     _key(colors, "default_value", [(x, 0.3, 0.2, 1.0) for x in (0.8, 0.2, 0.5, 0.9)])

@@ -48,6 +48,10 @@ class Materials:
         self._changes = changes if read == (self._aovs, self._has_light_tree) else Changes.everything()
         self._aovs, self._has_light_tree = read
 
+    def note_move(self, depsgraph):
+        """Blender is at another time now, of which instances' values are."""
+        self._attributes.begin(depsgraph)
+
     def ids_of(self, made_of):
         """The library's ids of evaluated materials, the default's for None; and whether each of them is of a
         volume alone, so that what is made of them is not there."""

@@ -9,7 +9,7 @@ import bpy
 from .. import native
 from ..compat import uses_nodes
 from ..log import Warnings
-from . import camera, deform, image, instance, light, mesh, meshes, motion, studio, world
+from . import camera, deform, image, instance, light, mesh, meshes, motion, studio, visibility, world
 from .changes import Changes
 from .image import Images
 from .material import Materials
@@ -53,25 +53,31 @@ class SceneSync:
         self.scene.destroy()
 
     @_uncollected()
-    def update(self, source, shutter=None, camera_keys=None):
+    def update(self, source, shutter=None, camera_keys=None, go_to_center=None):
         """Bring everything but the camera up to date. With a shutter, Blender is moved through it;
         camera_keys(fraction) is called at each time to look at the camera too. The caller restores
-        the frame."""
+        the frame. go_to_center: moves Blender there from the frame where that is not the shutter's middle, else None;
+        shaders are those of the frame, as in Cycles."""
         source.changes.objects |= self._moved | self._deformed  # though they may stand still now
         source.changes.geometry |= self._deformed
         # What was read at one time alone, or at several, may be named at none of them.
         source.changes.full |= self._had_shutter != (shutter is not None)
         self._had_shutter = shutter is not None
-        former = self._former(source)
-        if self._update_part(source, shutter, camera_keys):
+        shown, frame = self._shown, motion.frame_of(source.depsgraph.scene_eval)
+        if self._update_part(source, shutter, camera_keys, go_to_center):
             return
-        if source.changes.full:  # as may have turned out at another time
-            former = None
+        if motion.frame_of(source.depsgraph.scene_eval) != frame:  # as the attempt may have left it
+            source.engine.frame_set(*motion.split_frame(frame))
         self._images.begin(source.changes, size_limit(source), source.depsgraph.scene_eval.frame_current)
         self._materials.begin(source.depsgraph, source.changes, source.aovs)
         self._meshes.begin()
         self._sync_materials(source)
-        self._sync_world(source)  # as materials, at the shutter's middle
+        self._sync_world(source)  # as materials, before Blender is moved
+        if go_to_center is not None:
+            self._sync_shown_shaders(source)
+            go_to_center()
+            self._materials.note_move(source.depsgraph)
+        former = self._former(source, shown)
         told = self.warnings.count()
         walk = Walk(self, source, shutter, former and former.links_now(source))
         walk.run(former)
@@ -90,25 +96,30 @@ class SceneSync:
         self._moved, self._deformed = walk.movers()
         self._shown = Shown(walk, source, messages)
 
-    def _former(self, source):
-        """What the last walk found, None where another may not take anything over from it."""
-        shown = self._shown
+    def _former(self, source, shown):
+        """What the last walk found if another may take something over from it, else None."""
         if shown is None or source.changes.full or source.culling or not shown.is_of(source):
             return None
         if self.is_final and self._meshes.are_diced():  # by a camera that may have moved
             return None
         return shown
 
-    def _update_part(self, source, shutter, camera_keys):
+    def _touched(self, shown, source):
+        """The objects to look at again, each as shown.Shown.find gives it; None where only a walk can tell of one."""
+        names = source.changes.objects | shown.owners_of(source.changes.lights, source)
+        touched = [shown.find(name, source) for name in names]
+        return touched if all(touched) else None
+
+    def _update_part(self, source, shutter, camera_keys, go_to_center):
         """Bring up to date what changed, without a walk over everything; False where one is needed,
         which is safe at any point before the end."""
-        changes, shown = source.changes, self._former(source)
+        changes, shown = source.changes, self._former(source, self._shown)
         if shown is None or changes.structure:
             return False
         if not all(self._materials.knows(name) for name in changes.materials):
             return False
-        touched = [shown.find(name, source) for name in changes.objects | shown.owners_of(changes.lights, source)]
-        if not all(touched):
+        touched = self._touched(shown, source)
+        if touched is None:
             return False
         self._shown = None  # until all is done
         self._images.begin(changes, size_limit(source), source.depsgraph.scene_eval.frame_current)
@@ -119,11 +130,19 @@ class SceneSync:
             self._sync_world(source)
         if self._materials.read_names() != names:
             return False
+        if go_to_center is not None:
+            for each in touched:
+                self._sync_light_shader(each)
+            go_to_center()
+            touched = None if changes.structure or self._former(source, shown) is None \
+                else self._touched(shown, source)
+            if touched is None:
+                return False
         walk = Walk(self, source, shutter, shown.links)
         for each in touched:
             if each is not shown.IRRELEVANT and not self._change_object(each, shown, walk, source):
                 return False
-        if shutter is not None and not self._follow_part(walk, shutter, camera_keys, source):
+        if shutter is not None and not self._follow_part(walk, camera_keys, source):
             return False
         walk.send_deforming()
         items = walk.items.values()
@@ -138,7 +157,7 @@ class SceneSync:
         self._shown = shown
         return True
 
-    def _follow_part(self, walk, shutter, camera_keys, source):
+    def _follow_part(self, walk, camera_keys, source):
         """Look at what moves at its other times; False where Blender names anything else there, which is marked."""
         depsgraph = source.depsgraph
         for fraction in walk.times(camera_keys):
@@ -147,7 +166,6 @@ class SceneSync:
             if named.structure or not (named.objects <= source.changes.objects
                                        and named.geometry <= source.changes.geometry):
                 source.changes.note(depsgraph)
-                source.engine.frame_set(*shutter.frame_at(motion.CENTER))
                 return False
             for item in walk.items.values():
                 evaluated = source.originals.get(item.owner).evaluated_get(depsgraph)
@@ -207,6 +225,19 @@ class SceneSync:
         self._images.expect(data.node_tree for data in readers)
         for data in shown:
             self._materials.entry_of(data)
+
+    def _sync_shown_shaders(self, source):
+        """Flatten what else a walk would: lights' nodes, and materials as holes."""
+        view_layer = source.depsgraph.view_layer_eval
+        for each in source.depsgraph.object_instances:
+            if instance.is_light(each):
+                self._sync_light_shader(each)
+            elif visibility.is_holdout(each.object, instance.maker_of(each), view_layer):
+                self._materials.holes_of(materials_of(each.object, view_layer))
+
+    def _sync_light_shader(self, each):
+        if each is not Shown.IRRELEVANT and instance.is_light(each) and uses_nodes(each.object.data):
+            self._materials.light_id(each)
 
     def _sync_world(self, source):
         scene = source.depsgraph.scene_eval
