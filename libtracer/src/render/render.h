@@ -16,8 +16,8 @@
 #define TRC_DEFAULT_PACKET_SIZE 256
 
 /* Deepest path there is. Limits above it ("none") mean this: a path must end, and kernels count the
- * depths of a ray in 8 bits each. */
-#define TRC_MAX_DEPTH 254
+ * depths of a ray in 8 bits each, with two more for the world's light on what it meets. */
+#define TRC_MAX_DEPTH 253
 
 struct trc_render_state;
 

@@ -24,12 +24,16 @@ static bool is_constant3(const struct trc_operand *o) {
     return trc_is_constant(o[0]) && trc_is_constant(o[1]) && trc_is_constant(o[2]);
 }
 
-/* Whether an output of Light Path is another to light by different lobes. */
+/* Whether an output of Light Path is another to light by different lobes, or to samples of it. */
 static bool tells_lobes(uint32_t output) {
     return output == TRC_OUTPUT_OF(LIGHT_PATH, is_diffuse) ||
            output == TRC_OUTPUT_OF(LIGHT_PATH, is_glossy) ||
            output == TRC_OUTPUT_OF(LIGHT_PATH, is_reflection) ||
-           output == TRC_OUTPUT_OF(LIGHT_PATH, is_transmission);
+           output == TRC_OUTPUT_OF(LIGHT_PATH, is_transmission) ||
+           output == TRC_OUTPUT_OF(LIGHT_PATH, ray_depth) ||
+           output == TRC_OUTPUT_OF(LIGHT_PATH, diffuse_depth) ||
+           output == TRC_OUTPUT_OF(LIGHT_PATH, glossy_depth) ||
+           output == TRC_OUTPUT_OF(LIGHT_PATH, transmission_depth);
 }
 
 /* ---- microfacets ---- */

@@ -280,7 +280,7 @@ static inline void point(struct trc_surface *s, vvec3 wo, const struct model *m)
     s->ng = s->n = wide(0, 0, 1);
     s->wo = wo;
     s->backfacing = m->back ? vm_all_set() : vm_none();
-    s->depth = vi_set(1);
+    s->depths = vu_set(1u << TRC_DEPTH_ALL_SHIFT);
 }
 static inline void prepare(struct model *m, vvec3 wo, struct trc_surface *s, struct trc_lobes *l) {
     struct trc_registers regs;

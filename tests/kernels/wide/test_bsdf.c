@@ -382,7 +382,7 @@ static void factor_beyond(void **state) {
     assert_true(vf_get(b.indirect_scale, 0) > 0.0f && vf_get(b.indirect_scale, 0) < 1.0f);
     const double share = (double)vf_get(l.continue_weight / l.mix_weight, 0);
     struct trc_lobes first;
-    s.depth = vi_set(0);
+    s.depths = vu_set(0);
     struct trc_registers regs;
     memset(&regs, 0, sizeof regs);
     double at_first[2];

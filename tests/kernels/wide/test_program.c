@@ -368,7 +368,7 @@ static void build_surface(const struct world_of_test *w, struct trc_surface *s) 
     s->wo = v3(vf_set(.6f), vf_zero(), vf_set(.8f));
     s->path = vu_set(TRC_VISIBLE_GLOSSY | TRC_PATH_SINGULAR);
     s->ray_length = vf_set(7);
-    s->depth = vi_set(2);
+    s->depths = vu_set(2u << TRC_DEPTH_ALL_SHIFT);
 }
 
 /* What an operation must give on instance 0, on instance 1 and in the world. */
@@ -653,12 +653,12 @@ static void test_world(void **state) {
     snapshot.world.is_constant = 1;
     snapshot.world.radiance[1] = 5;
     const vvec3 up = v3(vf_zero(), vf_zero(), vf_one());
-    vvec3 c = trc_world_shade(&snapshot, up, vu_set(0), vm_from_bits(1));
+    vvec3 c = trc_world_shade(&snapshot, up, vu_set(0), vu_set(0), vm_from_bits(1));
     assert_true(vf_get(c.y, 0) == 5.0f && vf_get(c.x, 0) == 0.0f);
     if (TRC_WIDTH > 1)
         assert_true(vf_get(c.y, TRC_WIDTH - 1) == 0.0f);
     snapshot.world.material = UINT32_MAX;
-    c = trc_world_shade(&snapshot, up, vu_set(0), vm_all_set());
+    c = trc_world_shade(&snapshot, up, vu_set(0), vu_set(0), vm_all_set());
     assert_true(vf_get(c.y, 0) == 0.0f);
 }
 

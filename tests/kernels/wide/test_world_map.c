@@ -162,8 +162,9 @@ static void even_worlds_light_both_sides(void **state) {
         const vfloat u1 = (vi_to_float(vi_lane() + vi_set(i)) + vf_set(0.5f)) * vf_set(1.0f / 4096);
         trc_light_sample(&r, both, vf_set(0.5f), u1, test_wide_uniform(&random), &l);
         const vfloat bsdf_pdf = vf_set(0.2f);
-        const vvec3 seen = trc_world_radiance(&s.snapshot, r.p, both, vi_set(-1), l.wi, bsdf_pdf,
-                                              vf_one(), vu_set(TRC_VISIBLE_GLOSSY), vm_all_set());
+        const vvec3 seen =
+            trc_world_radiance(&s.snapshot, r.p, both, vi_set(-1), l.wi, bsdf_pdf, vf_one(),
+                               vu_set(TRC_VISIBLE_GLOSSY), vu_set(0), vm_all_set());
         for (int k = 0; k < TRC_WIDTH; k++) {
             const double cosine = (double)vf_get(v3_dot(l.wi, n), k);
             const double pdf = (double)vf_get(l.pdf, k);

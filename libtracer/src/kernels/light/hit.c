@@ -97,7 +97,7 @@ static vvec3 emission_met(const struct trc_snapshot *snapshot, const struct trc_
                                        .wi = ray->wi,
                                        .distance = distance,
                                        .time = ray->time,
-                                       .depth = ray->depth};
+                                       .depths = ray->depths};
     return trc_lamp_emission(&view, m);
 }
 
@@ -133,7 +133,8 @@ TRC_INLINE vmask lamp_meet(const struct trc_snapshot *snapshot, const struct trc
     vfloat weight = vf_one();
     vmask weighed = vm_andnot(hit, vf_lt(ray->bsdf_pdf, vf_zero()));
     if (lamp->bounce_limit) /* beyond it there were no samples */
-        weighed = vm_andnot(weighed, vi_lt(vi_set((int32_t)lamp->bounce_limit), ray->depth));
+        weighed = vm_andnot(weighed, vi_lt(vi_set((int32_t)lamp->bounce_limit),
+                                           (vint)trc_depth_of(ray->depths, TRC_DEPTH_ALL_SHIFT)));
     if (vm_any(weighed)) {
         const vfloat chance = chance_from(t, receiver, vi_set((int32_t)number), ray->wi, weighed);
         weight = ray_weight(ray->bsdf_pdf, pdf * chance, ray->light_sample_count);
@@ -305,7 +306,7 @@ vfloat trc_light_triangle_weight(const struct trc_surface *s, vvec3 p_from, vvec
 
 vvec3 trc_world_radiance(const struct trc_snapshot *snapshot, vvec3 p_from, vvec3 n_from, vint left,
                          vvec3 wi, vfloat bsdf_pdf, vfloat light_sample_count, vuint path,
-                         vmask active) {
+                         vuint depths, vmask active) {
     const struct trc_light_table *t = snapshot->lights;
     vmask m = active;
     const uint32_t visibility = snapshot->world.visibility;
@@ -316,7 +317,7 @@ vvec3 trc_world_radiance(const struct trc_snapshot *snapshot, vvec3 p_from, vvec
     }
     if (!vm_any(m))
         return v3_zero();
-    const vvec3 radiance = trc_world_shade(snapshot, wi, path, m);
+    const vvec3 radiance = trc_world_shade(snapshot, wi, path, depths, m);
     const vmask alone =
         vi_eq((vint)(path & vu_set(TRC_PATH_WORLD_ALONE)), vi_set(TRC_PATH_WORLD_ALONE));
     const vmask weighed = vm_andnot(m, vm_or(alone, vf_lt(bsdf_pdf, vf_zero())));

@@ -63,7 +63,7 @@ vvec3 trc_lamp_emission(const struct trc_lamp_view *v, vmask m) {
         .smooth = vm_none(),
         .ray_length = vf_select(vf_lt(v->distance, vf_set(TRC_FAR)), v->distance, vf_set(FLT_MAX)),
         .path = vu_set(0),
-        .depth = v->depth + vi_set(1),
+        .depths = v->depths + vu_set(1u << TRC_DEPTH_ALL_SHIFT),
     };
     int32_t number;
     for (vmask left = m; vm_any(left);) {
@@ -146,7 +146,7 @@ void trc_lamp_measure(const struct trc_snapshot *scene, const struct trc_light_t
                                      .table = table,
                                      .light = vi_set((int32_t)number),
                                      .time = vf_set(0.5f),
-                                     .depth = vi_set(0)};
+                                     .depths = vu_set(0)};
         view.p = v3_mad(way, spread(k, 0.6844301295f) * vf_set(reach), v3_set(lamp->position));
         const struct trc_place place =
             sample_one(lamp, view.p, spread(k, 0.6031687406f), spread(k, 0.5315532977f));

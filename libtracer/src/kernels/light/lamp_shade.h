@@ -13,7 +13,7 @@ struct trc_lamp_view {
     vvec3 p, wi;     /* the point; unit, from there to a place on the lamp */
     vfloat distance; /* to that place; TRC_FAR for a distant lamp */
     vfloat time;
-    vint depth; /* bounces that the point has behind it */
+    vuint depths; /* TRC_DEPTH_* that the point has behind it */
 };
 
 /* What the programs of the lanes' lamps emit towards the points; white for those without. */

@@ -89,7 +89,7 @@ static void shade_chosen_lamps(const struct draw *d, vmask m) {
                                        .wi = out->wi,
                                        .distance = out->distance,
                                        .time = d->s->time,
-                                       .depth = d->s->depth};
+                                       .depths = d->s->depths};
     const vvec3 light = v3_mul(out->radiance, trc_lamp_emission(&view, m));
     out->radiance = v3_select(m, light, out->radiance);
 }
@@ -126,6 +126,7 @@ static void evaluate_emission(const struct draw *d, vint index, vfloat u, vfloat
     e.ray_length = d->out->distance;
     e.raster_x = d->s->raster_x;
     e.raster_y = d->s->raster_y;
+    e.depths = trc_depths_beyond(d->s->depths, TRC_DEPTH_ALL_SHIFT);
     e.active = m;
     trc_surface_fetch(&e);
     const vint material = vi_gather((const int32_t *)&all->material, at, m);
@@ -172,11 +173,11 @@ static void sample_world(const struct draw *d, vmask m) {
     struct trc_place place =
         trc_world_sample(d->table, d->receiver.n, d->receiver.has_n, d->u1, d->u2, m);
     /* No kind of ray: Cycles evaluates light samples without any either. */
-    place.radiance = trc_world_shade(d->scene, place.wi, vu_set(0), m);
+    place.radiance = trc_world_shade(d->scene, place.wi, vu_set(0), d->s->depths, m);
     if (d->table->world_asks_rays) { /* what rays of some kind see is not lost */
         vvec3 seen[3];
         const vmask behind = vf_lt(v3_dot(d->s->ng, place.wi), vf_zero());
-        trc_world_shade_kinds(d->scene, place.wi, behind, m, seen);
+        trc_world_shade_kinds(d->scene, place.wi, behind, d->s->depths, m, seen);
         for (int k = 0; k < 3; k++)
             place.radiance = v3_add(v3_abs(place.radiance), v3_abs(seen[k]));
     }
@@ -279,7 +280,8 @@ static void limit_sample(const struct draw *d, vmask m) {
     const vint limit = vi_gather((const int32_t *)&d->table->lamps->bounce_limit,
                                  d->light * vi_set(TRC_LAMP_WORDS), m);
     const vmask limited = vm_andnot(m, vi_eq(limit, vi_set(0)));
-    const vmask beyond = vm_andnot(limited, vi_lt(d->s->depth, limit));
+    const vmask beyond =
+        vm_andnot(limited, vi_lt((vint)trc_depth_of(d->s->depths, TRC_DEPTH_ALL_SHIFT), limit));
     d->out->valid = vm_andnot(d->out->valid, beyond);
 }
 

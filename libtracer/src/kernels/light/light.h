@@ -62,9 +62,9 @@ struct trc_light_ray {
                         have no MIS */
     vfloat light_sample_count; /* L of the point, for the weights */
     vfloat time;
-    vuint path; /* TRC_VISIBLE_* | TRC_PATH_* */
-    vint depth; /* bounces */
-    vint left;  /* instance at p, -1: none; read where lights are linked */
+    vuint path;   /* TRC_VISIBLE_* | TRC_PATH_* */
+    vuint depths; /* TRC_DEPTH_* */
+    vint left;    /* instance at p, -1: none; read where lights are linked */
 };
 
 /* Light seen directly by the rays: area, point, spot with extent; where they miss also the sun.
@@ -105,6 +105,6 @@ vint trc_light_of_triangle(const struct trc_surface *s, vmask m);
  * world is hidden from rays of that path. */
 vvec3 trc_world_radiance(const struct trc_snapshot *snapshot, vvec3 p_from, vvec3 n_from, vint left,
                          vvec3 wi, vfloat bsdf_pdf, vfloat light_sample_count, vuint path,
-                         vmask active);
+                         vuint depths, vmask active);
 
 #endif

@@ -472,7 +472,7 @@ static void set_place(const struct trc_setup *c, const struct trc_leaf *leaf, st
     const struct trc_surface *s = c->s;
     const vfloat pixel = vf_divide(vf_set(0.5f) * s->pixel, NUMBER(radius)), one = vf_one();
     vmask near = vm_and(vf_gt(NUMBER(radius), vf_zero()), vf_lt(pixel, radius));
-    near = vm_and(near, vi_eq(s->depth, vi_set(0)));
+    near = vm_and(near, vi_eq((vint)trc_depth_of(s->depths, TRC_DEPTH_ALL_SHIFT), vi_set(0)));
     struct numbers random = numbers_of(s, OF_PLACE);
     const vfloat anywhere = vf_set(2.0f) * next_number(&random) - one;
     const vfloat at = vf_clamp(vf_divide(off, radius), -1.0f, 1.0f);

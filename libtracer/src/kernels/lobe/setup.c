@@ -78,7 +78,7 @@ static void set_chances(const struct trc_material *m, const struct trc_surface *
         vfloat sum = vf_zero();
         for (int i = 0; i < out->count; i++)
             sum = sum + out->lobe[i].mix_weight;
-        const vmask is_first = vi_eq(s->depth + s->transparent_depth, vi_set(0));
+        const vmask is_first = vi_eq((vint)s->depths, vi_set(0));
         floor_weight = vf_where(is_first, sum * vf_set(DEFENSIVE_SHARE));
     }
     out->mix_weight = vf_zero();

@@ -527,11 +527,16 @@ TRC_INLINE vfloat path_bit(const struct trc_surface *s, uint32_t bit) {
     return vf_truth(vm_not(vi_eq(masked, vi_set(0))));
 }
 
+TRC_INLINE vfloat depth_of_ray(const struct trc_surface *s, int shift) {
+    return vi_to_float((vint)trc_depth_of(s->depths, shift));
+}
+
 /* Cycles' camera rays start at the near clip, ours at the camera. */
 static vfloat op_ray_length(const struct trc_surface *s) {
     const struct trc_camera *camera = &s->snapshot->camera;
-    const vmask seen =
+    const vmask by_camera =
         vi_eq((vint)(s->path & vu_set(TRC_VISIBLE_CAMERA)), vi_set(TRC_VISIBLE_CAMERA));
+    const vmask seen = vm_and(by_camera, vf_gt(s->ray_length, vf_zero())); /* 0 to the world */
     if (!s->snapshot->has_camera || !vm_any(seen))
         return s->ray_length;
     if (trc_is_panorama(camera))
@@ -566,15 +571,17 @@ static vfloat op_light_path(const struct trc_surface *s, uint32_t output) {
     case TRC_OUTPUT_OF(LIGHT_PATH, ray_length):
         return op_ray_length(s);
     case TRC_OUTPUT_OF(LIGHT_PATH, ray_depth):
-        return vi_to_float(s->depth);
+        return depth_of_ray(s, TRC_DEPTH_ALL_SHIFT);
     case TRC_OUTPUT_OF(LIGHT_PATH, diffuse_depth):
-        return vi_to_float(s->diffuse_depth);
+        /* Of light that is found for matt lobes alone. */
+        return path_bit(s, TRC_VISIBLE_DIFFUSE) *
+               (vf_one() - path_bit(s, TRC_VISIBLE_TRANSMISSION));
     case TRC_OUTPUT_OF(LIGHT_PATH, glossy_depth):
-        return vi_to_float(s->glossy_depth);
+        return depth_of_ray(s, TRC_DEPTH_GLOSSY_SHIFT);
     case TRC_OUTPUT_OF(LIGHT_PATH, transparent_depth):
-        return vi_to_float(s->transparent_depth);
+        return depth_of_ray(s, TRC_DEPTH_TRANSPARENT_SHIFT);
     case TRC_OUTPUT_OF(LIGHT_PATH, transmission_depth):
-        return vi_to_float(s->transmission_depth);
+        return depth_of_ray(s, TRC_DEPTH_TRANSMISSION_SHIFT);
     case TRC_OUTPUT_OF(LIGHT_PATH, portal_depth):
         return vi_to_float((vint)(s->path >> TRC_PATH_PORTALS_SHIFT & vu_set(TRC_PATH_PORTALS)));
     default:

@@ -29,8 +29,9 @@ static vvec3 ambient_world(const struct trc_tile *t, const struct trc_surface *s
     struct trc_bsdf_value f;
     trc_bsdf_eval(lobes, s, wi, active, active, &f);
     const vfloat one = vf_set(1.0f), no_mis = vf_set(-1.0f);
-    const vvec3 world = trc_world_radiance(t->snapshot, s->p, n, s->instance, wi, no_mis, one,
-                                           vu_set(TRC_VISIBLE_DIFFUSE), active);
+    const vvec3 world = trc_world_radiance(
+        t->snapshot, s->p, n, s->instance, wi, no_mis, one, vu_set(TRC_VISIBLE_DIFFUSE),
+        trc_depths_beyond(s->depths, TRC_DEPTH_ALL_SHIFT), active);
     const vfloat cosine = vf_max(v3_dot(n, wi), vf_set(1e-6f));
     return v3_scale(v3_mul(f.diffuse, world), vf_divide(vf_set(TRC_PI), cosine));
 }

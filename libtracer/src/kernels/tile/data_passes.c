@@ -351,14 +351,14 @@ static void add_aovs(struct trc_tile *t, const struct trc_material *m,
     }
 }
 
-void trc_world_aovs(struct trc_tile *t, vvec3 d, vuint path, const uint32_t slots[TRC_WIDTH],
-                    vmask active) {
+void trc_world_aovs(struct trc_tile *t, vvec3 d, vuint path, vuint depths,
+                    const uint32_t slots[TRC_WIDTH], vmask active) {
     const vint straight = vi_set(TRC_PATH_TRANSPARENT_BACKGROUND);
     active = vm_and(active, vm_and(vi_eq((vint)path & straight, straight), is_not_done(path)));
     if (!vm_any(active))
         return;
     struct trc_registers regs;
-    const struct trc_material *m = trc_world_run(t->snapshot, d, path, active, &regs);
+    const struct trc_material *m = trc_world_run(t->snapshot, d, path, depths, active, &regs);
     add_aovs(t, m, &regs, slots, active);
 }
 

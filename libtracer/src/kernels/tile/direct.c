@@ -110,10 +110,10 @@ static vfloat matt_density(const struct trc_surface *s, const struct trc_light_s
 static void world_by_kind(const struct trc_surface *s, const struct trc_light_sample *l, vmask m,
                           vvec3 seen[3]) {
     const vmask behind = vf_lt(v3_dot(s->ng, l->wi), vf_set(0.0f));
-    trc_world_shade_kinds(s->snapshot, l->wi, behind, m, seen);
+    trc_world_shade_kinds(s->snapshot, l->wi, behind, s->depths, m, seen);
     if (!s->snapshot->lights->map)
         return;
-    const vvec3 sampled = trc_world_shade(s->snapshot, l->wi, vu_set(0), m);
+    const vvec3 sampled = trc_world_shade(s->snapshot, l->wi, vu_set(0), s->depths, m);
     seen[0] = v3_lerp(seen[0], sampled, sampled_part(s, l, matt_density(s, l), m));
     seen[1] = seen[2] = sampled;
 }

@@ -125,8 +125,9 @@ void trc_emission_misses(struct trc_tile *t, const struct arrival *a, vmask miss
     }
     if (!(t->snapshot->features & TRC_FEATURE_ENVIRONMENT) || !vm_any(missed))
         return;
-    const vvec3 c = trc_world_radiance(t->snapshot, a->o, a->n_from, left_before(t, a), a->d,
-                                       a->pdf, light_count_before(t, a->depths), a->path, missed);
+    const vvec3 c =
+        trc_world_radiance(t->snapshot, a->o, a->n_from, left_before(t, a), a->d, a->pdf,
+                           light_count_before(t, a->depths), a->path, a->depths, missed);
     const vvec3 added = light_of(t, a, c);
     found_add(t, a, vm_andnot(missed, clear), added, TRC_PASS_ENVIRONMENT);
     if (vm_any(clear))
@@ -137,7 +138,7 @@ void trc_emission_misses(struct trc_tile *t, const struct arrival *a, vmask miss
         one_group_add(t, a, missed, added, t->snapshot->world.light_group);
     const uint32_t material = t->snapshot->world.material;
     if (material != UINT32_MAX && t->snapshot->materials[material]->aov_count)
-        trc_world_aovs(t, a->d, a->path, a->slots, missed);
+        trc_world_aovs(t, a->d, a->path, a->depths, a->slots, missed);
 }
 
 /* Lamps of a light group, or of all, that the rays pass until their end. */

@@ -159,10 +159,7 @@ static void push_group(struct trc_tile *t, const struct search *search, int i,
     s.wo = v3_neg(a.d);
     s.ray_length = vf_load(&search->packet.t[i]);
     s.path = a.path;
-    s.depth = (vint)trc_depth_of(a.depths, TRC_DEPTH_ALL_SHIFT);
-    s.glossy_depth = (vint)trc_depth_of(a.depths, TRC_DEPTH_GLOSSY_SHIFT);
-    s.transmission_depth = (vint)trc_depth_of(a.depths, TRC_DEPTH_TRANSMISSION_SHIFT);
-    s.transparent_depth = (vint)trc_depth_of(a.depths, TRC_DEPTH_TRANSPARENT_SHIFT);
+    s.depths = a.depths;
     push_surfaces(t, &a, &s, met);
 }
 

@@ -15,26 +15,21 @@ static __attribute__((noinline)) vfloat pixel_of(const struct trc_shadow_store *
                : pixel;
 }
 
-/* 1 in lanes whose path word has that bit, else 0. */
-static vint has_bit(vuint path, uint32_t bit) {
-    return vi_select(vi_eq((vint)(path & vu_set(bit)), vi_set(0)), vi_set(0), vi_set(1));
+/* What a path word's bit adds to the counter at shift. */
+static vuint counted(vuint path, uint32_t bit, int shift) {
+    const vmask has = vm_not(vi_eq((vint)(path & vu_set(bit)), vi_set(0)));
+    return (vuint)vi_select(has, vi_set(1 << shift), vi_set(0));
 }
 
-/* What Light Path tells of the rays at order: as many bounces as those of the path, and one, which
+/* What Light Path tells of the rays at order: one bounce beyond those of what they left, which
  * counts among its kind where they stand for rays of lobes. */
 static void path_load(const struct trc_shadow_store *q, vint order, struct trc_surface *s) {
-    const vuint path = vu_gather(q->path, order, s->active);
     const vuint depths = vu_gather(q->depths, order, s->active);
-    const vint transmitted = has_bit(path, TRC_VISIBLE_TRANSMISSION);
-    s->path = path;
-    s->depth = (vint)trc_depth_of(depths, TRC_DEPTH_ALL_SHIFT) + vi_set(1);
-    s->diffuse_depth =
-        vi_select(vi_eq(transmitted, vi_set(0)), has_bit(path, TRC_VISIBLE_DIFFUSE), vi_set(0));
-    s->glossy_depth =
-        (vint)trc_depth_of(depths, TRC_DEPTH_GLOSSY_SHIFT) + has_bit(path, TRC_VISIBLE_GLOSSY);
-    s->transmission_depth = (vint)trc_depth_of(depths, TRC_DEPTH_TRANSMISSION_SHIFT) + transmitted;
-    s->transparent_depth = (vint)trc_depth_of(depths, TRC_DEPTH_TRANSPARENT_SHIFT) +
-                           (vint)vu_gather(q->passed, order, s->active);
+    s->path = vu_gather(q->path, order, s->active);
+    s->depths = trc_depths_beyond(depths, TRC_DEPTH_ALL_SHIFT) +
+                counted(s->path, TRC_VISIBLE_GLOSSY, TRC_DEPTH_GLOSSY_SHIFT) +
+                counted(s->path, TRC_VISIBLE_TRANSMISSION, TRC_DEPTH_TRANSMISSION_SHIFT) +
+                (vu_gather(q->passed, order, s->active) << TRC_DEPTH_TRANSPARENT_SHIFT);
 }
 
 /* What the surfaces that the lanes' rays meet let through; 0 where a material is opaque to shadows.

@@ -84,11 +84,7 @@ static void surface_setup(struct trc_tile *t, const struct arrival *a, uint32_t 
     s->wo = v3_neg(a->d);
     s->ray_length = arrival_length(a);
     s->path = a->path;
-    s->depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
-    s->diffuse_depth = vi_set(0);
-    s->glossy_depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_GLOSSY_SHIFT);
-    s->transmission_depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_TRANSMISSION_SHIFT);
-    s->transparent_depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_TRANSPARENT_SHIFT);
+    s->depths = a->depths;
     s->footprint = has & TRC_MATERIAL_READS_FOOTPRINT ? beam_width(t, a) : vf_set(0.0f);
     const bool needs_pixel = (has & TRC_MATERIAL_READS_PIXEL) || t->shadows.pixel;
     s->pixel = needs_pixel ? pixel_distance(t, a) : vf_set(0.0f);

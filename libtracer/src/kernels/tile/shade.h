@@ -53,7 +53,7 @@ TRC_INLINE struct trc_light_ray light_ray(const struct trc_tile *t, const struct
         .light_sample_count = light_count_before(t, a->depths),
         .time = a->time,
         .path = a->path,
-        .depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_ALL_SHIFT),
+        .depths = a->depths,
         .left = left_before(t, a),
     };
 }

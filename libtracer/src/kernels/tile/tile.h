@@ -51,15 +51,6 @@ enum {
     TRC_CATEGORY_MIXED /* either, in one direction: the shares say how much of each */
 };
 
-/* A ray's four depth counters, 8 bits each, saturating by the limits on desc. */
-enum {
-    TRC_DEPTH_ALL_SHIFT = 0,
-    TRC_DEPTH_GLOSSY_SHIFT = 8,
-    TRC_DEPTH_TRANSMISSION_SHIFT = 16,
-    TRC_DEPTH_TRANSPARENT_SHIFT = 24
-};
-TRC_INLINE vuint trc_depth_of(vuint depths, int shift) { return (depths >> shift) & vu_set(255u); }
-
 struct trc_hit_store {
     float *t, *u, *v;
     uint32_t *instance, *triangle, *material;
@@ -235,10 +226,10 @@ bool trc_shows_background_motion(const struct trc_tile *t);
 void trc_background_motion(struct trc_tile *t, vvec3 d, vuint path, const uint32_t slots[TRC_WIDTH],
                            vmask active);
 
-/* What the world's material gives to AOVs where rays in direction d leave the scene; path: their
- * words. (kernels/tile/data_passes.c) */
-void trc_world_aovs(struct trc_tile *t, vvec3 d, vuint path, const uint32_t slots[TRC_WIDTH],
-                    vmask active);
+/* What the world's material gives to AOVs where rays in direction d leave the scene; path, depths:
+ * their words. (kernels/tile/data_passes.c) */
+void trc_world_aovs(struct trc_tile *t, vvec3 d, vuint path, vuint depths,
+                    const uint32_t slots[TRC_WIDTH], vmask active);
 
 /* Traces and empties the shadow queue. (kernels/tile/shadow.c) */
 void trc_shadow_flush(struct trc_tile *t);

@@ -36,6 +36,20 @@ enum { TRC_WORLD_LOOKUP = -1, TRC_FIRST_LAMP = -2 };
 
 struct trc_probe; /* kernels/program/tracing.h */
 
+/* A ray's four depth counters, 8 bits each, saturating by the limits on desc. */
+enum {
+    TRC_DEPTH_ALL_SHIFT = 0,
+    TRC_DEPTH_GLOSSY_SHIFT = 8,
+    TRC_DEPTH_TRANSMISSION_SHIFT = 16,
+    TRC_DEPTH_TRANSPARENT_SHIFT = 24
+};
+TRC_INLINE vuint trc_depth_of(vuint depths, int shift) { return (depths >> shift) & vu_set(255u); }
+
+/* Counters with one bounce more, which the kind of the one that shift is of counts, too. */
+TRC_INLINE vuint trc_depths_beyond(vuint depths, int shift) {
+    return depths + vu_set(1u << TRC_DEPTH_ALL_SHIFT | 1u << shift);
+}
+
 struct trc_surface {
     const struct trc_snapshot *snapshot;
     const struct trc_probe *probe;       /* what its program traces rays with; NULL: none */
@@ -55,8 +69,8 @@ struct trc_surface {
     vvec3 bulge;      /* from p to the curved surface that the normals describe, on the side of wo;
                          0 where that is not above the triangle or where not smooth */
     vfloat ray_length;
-    vuint path; /* TRC_VISIBLE_* | TRC_PATH_* */
-    vint depth, diffuse_depth, glossy_depth, transmission_depth, transparent_depth;
+    vuint path;                /* TRC_VISIBLE_* | TRC_PATH_* */
+    vuint depths;              /* TRC_DEPTH_* */
     vfloat footprint;          /* width of the ray's cone at p, world, for texture filters */
     vfloat pixel;              /* how far the next pixel's ray is from p, world, for slopes */
     vfloat raster_x, raster_y; /* window coordinates [0, 1] */
