@@ -166,6 +166,9 @@ HAS_LITERAL_ALPHA = bpy.app.version >= (5, 0, 0)
 # The Glossy Color pass of Principled Hair is its albedo; in 3.4 its weight, whatever it absorbs.
 HAS_HAIR_ALBEDO = bpy.app.version >= (4, 0, 0)
 
+# To worlds rays are as long as can be, before they had no length.
+HAS_FAR_WORLDS = bpy.app.version >= (5, 0, 0)
+
 # Voronoi's points count however far they are; in 3.4 those nearer than 8.
 HAS_FAR_CELLS = bpy.app.version >= (4, 0, 0)
 

@@ -91,7 +91,8 @@ class FlatTree:
         return self.surface, self.film_colors, tuple(node.signature() for node in self.nodes)
 
 
-def flatten(tree, label, warnings, images=None, aovs=None, attributes=None, displacement=None):
+def flatten(tree, label, warnings, images=None, aovs=None, attributes=None, displacement=None,
+            is_of_world=False):
     """The surface of a material or world tree as a FlatTree.
 
     label names the owner in messages; images: image.Images, without which all are missing; aovs:
@@ -99,6 +100,7 @@ def flatten(tree, label, warnings, images=None, aovs=None, attributes=None, disp
     those of meshes alone are read; displacement: the mode of a DISPLACEMENT_OUTPUT, None where there is
     none."""
     walker = Walker(label, warnings, images, attributes)
+    walker.is_of_world = is_of_world
     sockets = _end_sockets(_ends(tree))
     if "Volume" in sockets:
         warnings.add(f"{label}: volume is not supported and is left out")
@@ -146,6 +148,7 @@ class Walker:
         self.flat = FlatTree()
         self.label, self.attributes = label, attributes
         self.is_displaced = False  # the material has a displacement
+        self.is_of_world = False
         self._warnings = warnings
         self._images = images
         self._done = {}       # (path names, node name) -> {output identifier: Value}

@@ -154,7 +154,7 @@ class Materials:
         key = ("world", world.name_full)
         label = f"World '{world.name}'"
         if uses_nodes(world):
-            flat = self._flatten(world, label, FixedAttributes(self._attributes))
+            flat = self._flatten(world, label, FixedAttributes(self._attributes), is_of_world=True)
         else:
             flat = _background(world.color)
         flat.ask_nothing()
@@ -249,10 +249,11 @@ class Materials:
         """The names of materials of this sync that are of volumes alone."""
         return {key for key in self._seen if self._entries[key].is_volume}
 
-    def _flatten(self, data, label, attributes, displacement=None):
+    def _flatten(self, data, label, attributes, displacement=None, is_of_world=False):
         """The tree of an evaluated material or world; one of Blender's making may be another in the next sync."""
         with shader_tree(data) as (tree, is_made):
-            flat = flatten.flatten(tree, label, self._warnings, self._images, self._aovs, attributes, displacement)
+            flat = flatten.flatten(tree, label, self._warnings, self._images, self._aovs, attributes, displacement,
+                                   is_of_world)
         flat.follows_scene |= is_made
         return flat
 

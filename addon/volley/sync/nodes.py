@@ -15,9 +15,9 @@ from ..abi import (AttributeMode, BlendMode, BumpMode, ClampType, CoordinateMode
                    MappingType, MathOperation as Math, ModeFlags, NodeType, NormalMapFlags, NormalMapSpace, Pigment,
                    PrincipledHairMode, RampInterpolation, SeparateMode, SpaceId, TableSize, TangentSource,
                    ToonComponent, VectorOperation as Vector)
-from ..compat import (CURVES_NORMAL_BUMPS, HAS_CORRELATED_MICROFACETS, HAS_FILMED_METAL, HAS_HAIR_ALBEDO,
-                      HAS_UNIT_NORMALS, HAS_WHOLE_COAT, KEEPS_DIFFUSE_ENERGY, LEAVES_BUMPS, LEVELS_COLOR_BUMPS,
-                      RAMP_STEPS, SCALES_NORMAL_MAPS, TURNS_WINDOW_BUMPS)
+from ..compat import (CURVES_NORMAL_BUMPS, HAS_CORRELATED_MICROFACETS, HAS_FAR_WORLDS, HAS_FILMED_METAL,
+                      HAS_HAIR_ALBEDO, HAS_UNIT_NORMALS, HAS_WHOLE_COAT, KEEPS_DIFFUSE_ENERGY, LEAVES_BUMPS,
+                      LEVELS_COLOR_BUMPS, RAMP_STEPS, SCALES_NORMAL_MAPS, TURNS_WINDOW_BUMPS)
 from . import standard_attributes, tangents
 from .attribute_values import excess_name, lack_name
 from .converters import CONVERTERS, instance_value, normal_to_world, strand_normal, strand_radius, strand_random
@@ -580,6 +580,8 @@ _LIGHT_PATH = ("Is Camera Ray", "Is Shadow Ray", "Is Diffuse Ray", "Is Glossy Ra
 def _light_path(walker, _node, _sockets):
     """No ray is scattered by a volume."""
     outputs = named_outputs(walker.emit(NodeType.LIGHT_PATH, ()), NodeType.LIGHT_PATH, _LIGHT_PATH)
+    if walker.is_of_world and HAS_FAR_WORLDS:
+        outputs["Ray Length"] = _constant('f', float(np.finfo(np.float32).max))
     return {**outputs, "Is Volume Scatter Ray": _constant('f', 0.0)}
 
 
