@@ -137,8 +137,13 @@ def inside_instances():
     scenes.empty()
     told, owners = [], {}
     volley.session.report_warning = lambda _engine, message: told.append(message)
-    for kind, depth in (('FLOAT_COLOR', 1), ('FLOAT', 1), ('BOOLEAN', 1), ('FLOAT', 2)):
-        made = owners[f"{kind} {depth}"] = _grid(f"{kind} {depth}")
+    for kind, depth, shares_ids in (('FLOAT_COLOR', 1, False), ('FLOAT', 1, False), ('BOOLEAN', 1, False),
+                                    ('FLOAT', 2, False), ('FLOAT', 1, True), ('FLOAT', 2, True)):
+        case = f"{kind} {depth}{' shared' * shares_ids}"
+        made = owners[case] = _grid(case)
+        if shares_ids:  # one by a few points, which Blender tells apart by other numbers
+            for number, item in enumerate(made.data.attributes.new("id", 'INT', 'POINT').data):
+                item.value = number // 3
         *inner, outer, store = scenes.geometry_nodes(
             made, *("GeometryNodeInstanceOnPoints",) * depth, "GeometryNodeStoreNamedAttribute")
         group = outer.id_data
@@ -295,6 +300,7 @@ def test_those_without_room_are_named(blender):
 
 
 def test_instances_of_nodes(blender):
+    """All but the first instance of an id were black."""
     pictures, told, can_read = blender.run(inside_instances)
     if can_read:  # without the rim, where cubes of neighbours lie in one place
         _compare({case: [np.pad(each[RIM:-RIM, RIM:-RIM], ((RIM, RIM), (RIM, RIM), (0, 0))) for each in pair]

@@ -62,8 +62,20 @@ class _Level:
                                   for name, types in _COMPONENTS.items())
         self._values, self._inner = {}, {}
         self._places, self._references = self._numbers("id"), self._numbers(".reference_index")
-        if self._places is not None:  # of instances of the same number, the first is the one that keeps it
-            self._places = {number: i for i, number in reversed(list(enumerate(self._places)))}
+        self._renumbered = []  # those that have other numbers, as one before has theirs
+        if self._places is not None:
+            self._places = self._first_of_each(self._places)
+
+    def _first_of_each(self, numbers):
+        """{number: instance} of those that keep their number."""
+        places = {}
+        for index, number in enumerate(numbers):
+            if number in places:
+                self._renumbered.append(index)
+            else:
+                places[number] = index
+        self._renumbered.reverse()
+        return places
 
     def _numbers(self, name):
         attribute = None if self._cloud is None else self._cloud.attributes.get(name)
@@ -78,6 +90,8 @@ class _Level:
         if self._references is None:
             return None
         if self._places is not None:
+            if number not in self._places and self._renumbered:  # Blender draws others, and tells them in order
+                self._places[number] = self._renumbered.pop()
             return self._places.get(number)
         return number if 0 <= number < len(self._references) else None
 
