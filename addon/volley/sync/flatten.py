@@ -127,7 +127,9 @@ def _ends(tree, path=()):
              for each in _ends(node.node_tree, path + (node,))]
     end = tree.get_output_node('CYCLES')
     own = [] if end is None or end.mute and not INLINES_GROUPS else [(end, path)]
-    return (own + inner)[:1] if INLINES_GROUPS else inner + own
+    if INLINES_GROUPS:
+        return sorted(own + inner, key=lambda each: each[0].target != 'CYCLES')[:1]
+    return inner + own
 
 
 def _is_entered(node, path):
