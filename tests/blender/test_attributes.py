@@ -16,6 +16,7 @@ NAMES = (("N", "Vector"), ("uv", "Vector"), ("uv", "Fac"), ("generated", "Vector
          ("UVMap.tangent", "Vector"), ("UVMap.tangent", "Fac"), ("pointiness", "Fac"), ("random_per_island", "Fac"),
          ("color", "Color"), ("color", "Alpha"), ("velocity", "Vector"), ("temperature", "Fac"),
          ("curve_length", "Fac"), ("plain", "Vector"))
+MORE_NAMES = ("Ng", "Vector"), ("undisplaced", "Vector")  # a mesh has room for eight
 
 
 # Inside Blender ------------------------------------------------------------------------------------
@@ -227,7 +228,7 @@ def inside_outputs():
     return _pictures_of(owners), told
 
 
-def inside_names():
+def inside_names(names):
     """Pictures of the names that Cycles keeps for itself: of a mesh without such attributes, and of one that has
     them; the warnings."""
     import scenes
@@ -235,7 +236,7 @@ def inside_names():
     scenes.empty()
     told, owners = [], {}
     volley.session.report_warning = lambda _engine, message: told.append(message)
-    for name, output in NAMES:
+    for name, output in names:
         for is_own in (False, True):
             made = owners[f"{name} {output}{' own' * is_own}"] = scenes.sphere(radius=0.4)
             made.scale, made.rotation_euler = (1.0, 1.0, 0.8), (0.3, 0.2, 0.5)
@@ -310,8 +311,11 @@ def test_instances_of_nodes(blender):
 
 def test_names_that_cycles_keeps(blender):
     """Without them, meshes without an attribute of that name are black, and those with one show it."""
-    pictures, told = blender.run(inside_names)
+    pictures = {}
+    for names in (NAMES, MORE_NAMES):
+        found, told = blender.run(inside_names, names)
+        pictures.update(found)
+        assert told == []
     _compare(pictures, pictures)
-    assert told == []
     shown = [case for case, (_, theirs) in pictures.items() if theirs[8:-8, 8:-8].std() > 0.03]
     assert {"N Vector", "uv Fac own", "tangent Vector", "UVMap.tangent Vector", "plain Vector own"} <= set(shown)

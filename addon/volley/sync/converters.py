@@ -164,6 +164,12 @@ def normal_to_world(walker, normal):
     return _vector(walker, Vector.SCALE, unit, scale=length)
 
 
+def point_to_world(walker, point):
+    """A place in object space as one of the world."""
+    mode = _transform_mode(SpaceId.OBJECT, SpaceId.WORLD, TransformedType.POINT)
+    return Value('v', walker.emit(NodeType.VECTOR_TRANSFORM, (point,), mode), 0)
+
+
 def _vector_rotate(walker, node, sockets):
     values = [sockets.get(kind, name) for kind, name in (
         ('v', "Vector"), ('v', "Center"), ('v', "Axis"), ('f', "Angle"), ('v', "Rotation"))]

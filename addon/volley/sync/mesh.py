@@ -431,6 +431,10 @@ def _named_values(mesh, data, name, loops, group_names):
     """The same as below, or what a standard attribute of that name holds."""
     if name == standard_attributes.NORMAL:
         return widen(np.array(vertex_normals(mesh)))[_corner_vertices(mesh)[loops.of_triangles]]
+    if name == standard_attributes.UNDISPLACED:
+        return widen(read_positions(mesh)[_corner_vertices(mesh)[loops.of_triangles]])
+    if name == standard_attributes.FACE_NORMAL:
+        return widen(_triangle_normals(read_positions(mesh)[_corner_vertices(mesh)[loops.of_triangles]]))
     if name == standard_attributes.UV:
         layer = next((each for each in mesh.uv_layers if each.active_render), None)
         return None if layer is None else widen(_uv_values(layer, len(mesh.loops))[loops.of_triangles])
@@ -438,6 +442,14 @@ def _named_values(mesh, data, name, loops, group_names):
     if layer is not None or name == standard_attributes.TANGENT and not mesh.uv_layers:
         return widen(_tangents(mesh, data, layer, loops, tangents.vectors_of_corners))
     return _attribute_values(mesh, name, loops, group_names)
+
+
+def _triangle_normals(corners):
+    """(triangles * 3, 3): the unit normal of each corner's triangle; 0 of those without an area."""
+    a, b, c = corners.reshape(-1, 3, 3).transpose(1, 0, 2)
+    across = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(across, axis=1, keepdims=True)
+    return np.repeat(across / np.where(lengths > 0.0, lengths, 1.0), 3, axis=0)
 
 
 def _attribute_values(mesh, name, loops, group_names):

@@ -20,7 +20,8 @@ from ..compat import (CURVES_NORMAL_BUMPS, HAS_CORRELATED_MICROFACETS, HAS_FAR_W
                       LEVELS_COLOR_BUMPS, RAMP_STEPS, SCALES_NORMAL_MAPS, TURNS_WINDOW_BUMPS)
 from . import standard_attributes, tangents
 from .attribute_values import excess_name, lack_name
-from .converters import CONVERTERS, instance_value, normal_to_world, strand_normal, strand_radius, strand_random
+from .converters import (CONVERTERS, instance_value, normal_to_world, point_to_world, strand_normal, strand_radius,
+                         strand_random)
 from .derived import ISLAND, POINTINESS
 from .image import image_color
 from .instance import VALUES_GENERATED, VALUES_UV
@@ -544,6 +545,8 @@ def _mesh_attribute(walker, node):
     color = _attribute_color(walker, name)
     if name == standard_attributes.NORMAL and standard_attributes.IS_NORMAL_WORLD:
         color = normal_to_world(walker, color._replace(kind='v'))._replace(kind='c')
+    if name == standard_attributes.UNDISPLACED:
+        color = point_to_world(walker, color._replace(kind='v'))._replace(kind='c')
     return color, alpha, excess
 
 

@@ -6,6 +6,9 @@ from .derived import ISLAND, POINTINESS
 
 NOTHING = ".nothing"  # an attribute that no mesh brings
 NORMAL, UV, GENERATED, TANGENT = "N", "uv", "generated", "tangent"
+# Cycles 5 keeps neither. It makes the second of the vertices after they are where objects stand that are still and
+# alone, which are most, and all are taken for such.
+FACE_NORMAL, UNDISPLACED = (None, None) if HAS_FEW_STANDARD_ATTRIBUTES else ("Ng", "undisplaced")
 OF_MAP = "." + TANGENT  # after the name of a UV map
 IS_NORMAL_WORLD = HAS_FEW_STANDARD_ATTRIBUTES  # in Cycles of objects that stand still and alone, which are most
 
