@@ -7,7 +7,7 @@ static const float white[3] = {1, 1, 1};
 
 /* The most bounces there are, and throughput below which Whitted leaves rays out: what is lost is
  * far below the tolerances. */
-#define DEEP 254
+#define DEEP 253
 #define FAINT 1e-8f
 
 static const uint32_t integrators[] = {TRC_INTEGRATOR_WHITTED, TRC_INTEGRATOR_DISTRIBUTION};

@@ -128,7 +128,9 @@ TRC_API trc_status trc_mesh_update(trc_scene scene, trc_id mesh, uint32_t key_co
  * uses it. */
 TRC_API trc_status trc_mesh_destroy(trc_scene scene, trc_id mesh);
 
-/* Which rays see an instance or a light. */
+/* Which rays see an instance or a light. Shadow rays are those of light samples; samples of the
+ * world that stand for what Cycles finds by rays of lobes are blocked by what these see: of even
+ * worlds all, of others a part by the densities of both. */
 enum trc_visible_rays {
     TRC_VISIBLE_CAMERA = 1,
     TRC_VISIBLE_DIFFUSE = 2,

@@ -129,8 +129,8 @@ static uint32_t unblocked_last(struct trc_tile *t) {
     return others;
 }
 
-/* Traces the rays [begin, end) of the order. blockers: what is in the way of shadow rays; in that of
- * rays that stand for those of lobes is what these see. shift: where the bits of both stand. */
+/* Traces the rays [begin, end) of the order. blockers: what is in the way of shadow rays; in that
+ * of rays that stand for those of lobes is what these see. shift: where the bits of both stand. */
 static void lit_trace(struct trc_tile *t, uint32_t begin, uint32_t end, uint32_t blockers,
                       uint32_t shift) {
     struct trc_shadow_store *q = &t->shadows;
