@@ -44,7 +44,11 @@ static void test_what_light_path_tells(void **state) {
     static const uint32_t of_lobes = 1u << TRC_OUTPUT_OF(LIGHT_PATH, is_diffuse) |
                                      1u << TRC_OUTPUT_OF(LIGHT_PATH, is_glossy) |
                                      1u << TRC_OUTPUT_OF(LIGHT_PATH, is_reflection) |
-                                     1u << TRC_OUTPUT_OF(LIGHT_PATH, is_transmission);
+                                     1u << TRC_OUTPUT_OF(LIGHT_PATH, is_transmission) |
+                                     1u << TRC_OUTPUT_OF(LIGHT_PATH, ray_depth) |
+                                     1u << TRC_OUTPUT_OF(LIGHT_PATH, diffuse_depth) |
+                                     1u << TRC_OUTPUT_OF(LIGHT_PATH, glossy_depth) |
+                                     1u << TRC_OUTPUT_OF(LIGHT_PATH, transmission_depth);
     for (uint32_t output = 0; output < TRC_OUTPUT_OF(LIGHT_PATH, end); output++) {
         graph_clear();
         const int32_t path = add(TRC_NODE_LIGHT_PATH, 0, 0, NULL);
