@@ -23,6 +23,9 @@ struct connection {
  * started with that is not its own. */
 void system_prepare(void);
 
+/* How many threads the program has; 0 where processes are not copies of it. */
+size_t system_count_threads(void);
+
 /* Makes and ends processes as the library asks, until the library has gone or has asked nothing for
  * long. In each process serve(connection) runs, and the process ends when it returns. The exit code
  * of the program. */

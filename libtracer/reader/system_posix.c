@@ -3,6 +3,7 @@
 #define _GNU_SOURCE
 #include "system.h"
 
+#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <malloc.h>
@@ -44,6 +45,17 @@ void system_prepare(void) {
     const long limit = sysconf(_SC_OPEN_MAX);
     for (int i = FIRST_FOREIGN_DESCRIPTOR; i < (limit > 0 ? limit : DESCRIPTORS_WITHOUT_LIMIT); i++)
         close(i);
+}
+
+size_t system_count_threads(void) {
+    size_t count = 0;
+    DIR *tasks = opendir("/proc/self/task");
+    if (!tasks)
+        return 0;
+    for (const struct dirent *entry; (entry = readdir(tasks));)
+        count += entry->d_name[0] != '.';
+    (void)closedir(tasks);
+    return count;
 }
 
 /* ---- streams ---- */

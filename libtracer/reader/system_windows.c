@@ -16,6 +16,8 @@ void system_prepare(void) {
     SetErrorMode(SEM_FAILCRITICALERRORS | SEM_NOGPFAULTERRORBOX | SEM_NOOPENFILEERRORBOX);
 }
 
+size_t system_count_threads(void) { return 0; }
+
 /* It ends with its host, which idle processes end with, too. */
 bool connection_receive(struct connection *connection, void *bytes, size_t size, bool idle) {
     (void)idle;

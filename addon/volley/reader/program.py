@@ -19,6 +19,7 @@ import signal
 import socket
 import struct
 import sys
+import time
 
 try:
     import resource
@@ -45,6 +46,7 @@ _TEXEL_BYTES = (1, 2, 2, 4)
 
 _IDLE_SECONDS = 120    # without a request for so long a process ends, and with no process left the program
 _MAX_PROCESSES = 256
+_THREAD_SECONDS = 5    # for a thread to end that has nothing to do
 _STRIP_ROWS = 64       # as OpenImageIO reads files of which nothing else is known
 _COLOR_STEPS = 16      # by which a transform that changes nothing is found out
 _PR_SET_PDEATHSIG = 1
@@ -446,10 +448,23 @@ class Pipe:
             content = content[os.write(self._descriptor, content):]
 
 
+def _count_threads():
+    return len(os.listdir("/proc/self/task")) if os.path.isdir("/proc/self/task") else 0
+
+
+def _do_without_threads(oiio):
+    """Files are read side by side by several processes, which need no threads. OpenImageIO starts one all the same and
+    ends it at once: a process that is copied while that thread holds the lock of its pool would wait for ever."""
+    own, deadline = _count_threads(), time.monotonic() + _THREAD_SECONDS
+    oiio.attribute("threads", 1)
+    while _count_threads() > own and time.monotonic() < deadline:
+        time.sleep(0.001)
+
+
 def _load_openimageio():
     import OpenImageIO as oiio
     import numpy  # noqa: F401  (loaded once, not in each process)
-    oiio.attribute("threads", 1)  # files are read side by side by several processes
+    _do_without_threads(oiio)
     oiio.attribute("exr_threads", 1)
     oiio.get_string_attribute("input_format_list")  # finds what there is before processes are made
     return oiio
