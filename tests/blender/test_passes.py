@@ -181,16 +181,16 @@ def inside_holdouts():
         scenes.wall("Back", 6.0, 2.0, material=matt).pass_index = 7
         scenes.light(energy=300.0)
         layer = bpy.context.view_layer
-        for name in ("z", "mist", "normal", "uv", "object_index", "diffuse_color"):
+        for name in ("z", "mist", "normal", "uv", "object_index", "diffuse_color", "ambient_occlusion"):
             setattr(layer, f"use_pass_{name}", True)
         layer.volley.denoising_store_passes = layer.cycles.denoising_store_passes = True
-        both = _both(["Depth", "Mist", "Normal", "UV", "IndexOB", "DiffCol", "Denoising Depth"], 64)
+        both = _both(["Depth", "Mist", "Normal", "UV", "IndexOB", "DiffCol", "AO", "Denoising Depth"], 64)
         found.update(((kind, name), pair) for name, pair in both.items())
     return found
 
 
 def test_holdouts(blender):
-    """Where all is held out there is nothing, not even depth."""
+    """Where all is held out there is nothing, neither depth nor ambient occlusion."""
     for (kind, name), (ours, theirs) in blender.run(inside_holdouts).items():
         ours, theirs = (np.minimum(each[:, 12, 16], 100.0) for each in (ours, theirs))
         assert ours == pytest.approx(theirs, rel=0.02, abs=0.03), f"{kind}, {name}"

@@ -117,6 +117,11 @@ struct trc_lobes {
     float clear_alpha2;
 };
 
+/* Lanes where all is held out: they have no data and no ambient occlusion, as in Cycles. */
+TRC_INLINE vmask trc_lobes_are_holdout(const struct trc_lobes *lobes) {
+    return vf_ge(v3_average(lobes->holdout), vf_set(1.0f));
+}
+
 /* From a material's leaves and the registers its program left. filter_alpha: lower bound on alpha
  * (Filter Glossy), 0 for none. Unit: weights include mix factors and alpha.
  * (kernels/lobe/setup.c) */

@@ -105,6 +105,7 @@ void trc_ambient_pass(struct trc_tile *t, const struct arrival *a, const struct 
                       const struct trc_lobes *lobes, vmask active) {
     const vint camera = vi_set(TRC_VISIBLE_CAMERA);
     active = vm_and(active, vi_eq((vint)a->path & camera, camera));
+    active = vm_andnot(active, trc_lobes_are_holdout(lobes));
     trc_shadow_reserve(t, 1);
     vvec3 n, x, y;
     vfloat u[2];

@@ -375,10 +375,9 @@ vuint trc_data_passes(struct trc_tile *t, const struct trc_surface *s, const str
     struct trc_surface solid;
     if (m->aov_count)
         add_aovs(t, m, regs, slots, vm_and(seen_straight(s), is_not_done(s->path)));
-    if (m->has & TRC_MATERIAL_HAS_HOLDOUT) { /* whole ones have nothing else, as in Cycles */
-        const vmask whole = vf_ge(v3_average(lobes->holdout), vf_set(1.0f));
+    if (m->has & TRC_MATERIAL_HAS_HOLDOUT) {
         solid = *s;
-        solid.active = vm_andnot(s->active, vm_and(seen_straight(s), whole));
+        solid.active = vm_andnot(s->active, vm_and(seen_straight(s), trc_lobes_are_holdout(lobes)));
         s = &solid;
     }
     const vuint path = trc_denoising_passes(t, s, lobes, found_weight, length, slots);
