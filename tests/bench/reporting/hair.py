@@ -25,13 +25,20 @@ def headlines(results):
     """The least and the most gain at each size beside each Blender's Cycles."""
     lines = []
     for cycles, made in elsewhere.beside(results, "hair"):
-        at = [f"{digits(ratios[0], 2)} to {digits(ratios[-1], 2)} times as long at {width}×{height}"
+        at = [f"{_span(ratios)} times as long at {width}×{height}"
               + f" ({len(ratios)} of them)" * (len(ratios) < len(made))
               for (width, height), ratios in ((size, [gain["ratio"] for _name, gain in whole_renders.gains(made, key)])
                                               for size, key in ((SIZE_PX, "seconds"), (LARGE_SIZE_PX, LARGE))) if ratios]
-        lines.append(f"With {len(made)} scenes of hair, a first F12 of {whole_renders.SAMPLES} samples takes {cycles} "
+        scenes = "one scene" if len(made) == 1 else f"{len(made)} scenes"
+        lines.append(f"With {scenes} of hair, a first F12 of {whole_renders.SAMPLES} samples takes {cycles} "
                      f"{', '.join(at)}.")
     return lines
+
+
+def _span(ratios):
+    """The least and the most of sorted ratios."""
+    ends = digits(ratios[0], 2), digits(ratios[-1], 2)
+    return " to ".join(dict.fromkeys(ends))
 
 
 def losses(results):
