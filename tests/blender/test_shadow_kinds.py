@@ -11,6 +11,7 @@ LIGHTS = ("sun", "area", "point", "even world", "sky", "sky without samples")
 # Means over those of Cycles, less 1; skies by the densities of two samplings. Before, Ray Length was in parts of the
 # way to the light, Ray Depth 0 and the world's light a shadow ray's: off by up to all of the light.
 OFF = {"sky": 0.02}
+SWITCH_NAMES = ("visible_shadow", "visible_diffuse", "visible_glossy")
 SWITCHES = ((), ("visible_shadow",), ("visible_diffuse",), ("visible_glossy",), ("visible_shadow", "visible_diffuse"))
 TILE_OFF = 0.01  # of the mean; before, up to .4
 OUTPUTS = ("Is Shadow Ray", "Is Camera Ray", "Is Diffuse Ray", "Is Reflection Ray", "Ray Length", "Ray Depth",
@@ -83,7 +84,7 @@ def inside_switches():
             _floor(floor, Color=(0.8, 0.8, 0.8), **inputs)
             ball = scenes.sphere("Ball", 0.7, (0.0, 0.0, 0.71))
             for switches in SWITCHES:
-                for switch in SWITCHES[-1] + SWITCHES[3]:
+                for switch in SWITCH_NAMES:
                     setattr(ball, switch, switch not in switches)
                 found[kind, floor, switches] = [pictures[..., :3] for pictures in scenes.seeds_by_both(4 * SAMPLES)]
     return found
