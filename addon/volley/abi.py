@@ -904,19 +904,19 @@ class RenderDesc(Structure):
     _fields_ = (("struct_size", c_uint32), ("width", c_uint32), ("height", c_uint32), ("crop_x", c_uint32),
                 ("crop_y", c_uint32), ("crop_width", c_uint32), ("crop_height", c_uint32),
                 ("integrator", c_uint32), ("sample_count", c_uint32), ("light_samples", c_uint32),
-                ("max_depth", c_uint32), ("max_transparent_depth", c_uint32), ("max_glossy_depth", c_uint32),
-                ("max_transmission_depth", c_uint32), ("attenuation_cutoff", c_float),
-                ("filter_glossy", c_float), ("clamp_direct", c_float), ("clamp_indirect", c_float),
-                ("assembly", c_uint32), ("packet_size", c_uint32), ("sampler", c_uint32), ("seed", c_uint32),
-                ("filter", c_uint32), ("filter_width", c_float), ("film_transparent", c_uint32),
-                ("film_transparent_glass", c_uint32), ("film_transparent_roughness", c_float),
-                ("film_exposure", c_float), ("passes", c_uint64), ("thread_count", c_uint32),
-                ("progressive", c_uint32), ("noise_threshold", c_float), ("min_samples", c_uint32),
-                ("mist_start", c_float), ("mist_depth", c_float), ("mist_falloff", c_float),
-                ("cryptomattes", c_uint32), ("cryptomatte_depth", c_uint32), ("aov_value_count", c_uint32),
-                ("aov_color_count", c_uint32), ("light_group_count", c_uint32), ("denoise", c_uint32),
-                ("sample_offset", c_uint32), ("sample_subset", c_uint32), ("pass_flags", c_uint32),
-                ("guides", c_uint32))
+                ("max_depth", c_uint32), ("max_transparent_depth", c_uint32), ("max_shadow_depth", c_uint32),
+                ("max_glossy_depth", c_uint32), ("max_transmission_depth", c_uint32),
+                ("attenuation_cutoff", c_float), ("filter_glossy", c_float), ("clamp_direct", c_float),
+                ("clamp_indirect", c_float), ("assembly", c_uint32), ("packet_size", c_uint32),
+                ("sampler", c_uint32), ("seed", c_uint32), ("filter", c_uint32), ("filter_width", c_float),
+                ("film_transparent", c_uint32), ("film_transparent_glass", c_uint32),
+                ("film_transparent_roughness", c_float), ("film_exposure", c_float), ("passes", c_uint64),
+                ("thread_count", c_uint32), ("progressive", c_uint32), ("noise_threshold", c_float),
+                ("min_samples", c_uint32), ("mist_start", c_float), ("mist_depth", c_float),
+                ("mist_falloff", c_float), ("cryptomattes", c_uint32), ("cryptomatte_depth", c_uint32),
+                ("aov_value_count", c_uint32), ("aov_color_count", c_uint32),
+                ("light_group_count", c_uint32), ("denoise", c_uint32), ("sample_offset", c_uint32),
+                ("sample_subset", c_uint32), ("pass_flags", c_uint32), ("guides", c_uint32))
 
 
 class RenderProgress(Structure):

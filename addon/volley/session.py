@@ -11,7 +11,7 @@ import bpy
 
 from . import abi, cryptomatte, jobs, native, passes
 from .commit import Commit
-from .compat import motion_position
+from .compat import COUNTS_LAST_PASSED, motion_position
 from .farm import content, job, parts
 from .log import logger
 from .sync import Cancelled, SceneSync, Source, camera, culling, dicing, motion, world
@@ -330,7 +330,8 @@ def render_fields(scene, frame, crop, entries, is_preview=False):
         "sample_offset": 0 if is_preview else settings.sample_offset,
         "sample_subset": 0 if is_preview else settings.sample_subset,
         "light_samples": settings.light_samples,
-        "max_depth": settings.max_depth, "max_transparent_depth": settings.max_transparent_depth,
+        "max_depth": settings.max_depth, "max_shadow_depth": settings.max_transparent_depth,
+        "max_transparent_depth": max(settings.max_transparent_depth - int(COUNTS_LAST_PASSED), 0),
         "max_glossy_depth": settings.max_glossy_depth,
         "max_transmission_depth": settings.max_transmission_depth,
         "attenuation_cutoff": settings.attenuation_cutoff, "filter_glossy": settings.filter_glossy,

@@ -129,13 +129,14 @@ static void panes_are_limited(void **state) {
     }
 }
 
-/* Shadow rays pass as many panes as the limit says, less those that the camera saw the surface
- * through, as in Cycles 3.4 (measured there with up to three seen and four in the way, at limits of
- * 2 and 3). Panes below the camera are in the way of both. */
-static void panes_in_shadows_are_limited(void **state) {
-    (void)state;
+/* Shadow rays pass as many panes as their limit says, or that of paths, less those that the camera
+ * saw the surface through, as in Cycles 3.4 (measured there with up to three seen and four in the
+ * way, at limits of 2 and 3). Panes below the camera are in the way of both. */
+static void expect_shadows(uint32_t max_transparent_depth, uint32_t max_shadow_depth,
+                           uint32_t limit) {
     trc_render_desc desc = level_desc(4);
-    desc.max_transparent_depth = 3;
+    desc.max_transparent_depth = max_transparent_depth;
+    desc.max_shadow_depth = max_shadow_depth;
     for (uint32_t seen = 0; seen < 3; seen++)
         for (uint32_t above = 0; above < 5; above++) {
             const trc_scene scene = fixture_level_view();
@@ -149,10 +150,17 @@ static void panes_in_shadows_are_limited(void **state) {
             add_panes(scene, seen, 0.2f);
             add_panes(scene, above, 2.0f);
             assert_ok(trc_scene_commit(scene));
-            const double want = 2 * seen + above <= desc.max_transparent_depth ? 0.5 : 0.0;
+            const double want = 2 * seen + above <= limit ? 0.5 : 0.0;
             expect_all(scene, &desc, TRC_PASS_COMBINED, want, 1e-4);
             assert_ok(trc_scene_destroy(scene));
         }
+}
+
+static void panes_in_shadows_are_limited(void **state) {
+    (void)state;
+    expect_shadows(3, UINT32_MAX, 3);
+    expect_shadows(2, 3, 3);
+    expect_shadows(3, 2, 2);
 }
 
 /* Triangles of slots that an instance has no material for have its last one, for shadow rays too.

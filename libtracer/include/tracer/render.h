@@ -117,6 +117,7 @@ typedef struct trc_render_desc {
     uint32_t light_samples;           /* shadow rays per camera hit, 1..64; 0 chooses */
     uint32_t max_depth;               /* bounces; 0: direct light only */
     uint32_t max_transparent_depth;   /* transparent surfaces that a path passes straight */
+    uint32_t max_shadow_depth;        /* that it passes with its shadow ray; UINT32_MAX: as many */
     uint32_t max_glossy_depth, max_transmission_depth; /* further limits; UINT32_MAX none */
     float attenuation_cutoff; /* a ray whose throughput is below is not traced; Distribution decides
                                  by chance instead, unbiased, and does not read it */

@@ -771,6 +771,7 @@ const struct trc_abi_entry trc_abi_entries[] = {
     {"trc_render_desc.light_samples", offsetof(trc_render_desc, light_samples)},
     {"trc_render_desc.max_depth", offsetof(trc_render_desc, max_depth)},
     {"trc_render_desc.max_glossy_depth", offsetof(trc_render_desc, max_glossy_depth)},
+    {"trc_render_desc.max_shadow_depth", offsetof(trc_render_desc, max_shadow_depth)},
     {"trc_render_desc.max_transmission_depth", offsetof(trc_render_desc, max_transmission_depth)},
     {"trc_render_desc.max_transparent_depth", offsetof(trc_render_desc, max_transparent_depth)},
     {"trc_render_desc.min_samples", offsetof(trc_render_desc, min_samples)},

@@ -125,6 +125,7 @@ trc_render_desc trc_render_desc_default(void) {
                              .sample_count = 16,
                              .max_depth = 50,
                              .max_transparent_depth = 8,
+                             .max_shadow_depth = UINT32_MAX,
                              .max_glossy_depth = UINT32_MAX,
                              .max_transmission_depth = UINT32_MAX,
                              .filter = TRC_FILTER_BLACKMAN_HARRIS,

@@ -76,8 +76,10 @@ trc_render_desc trc_render_resolve(const trc_render_desc *desc) {
         r.sample_subset = r.sample_count - r.sample_offset;
     if (!r.thread_count)
         r.thread_count = trc_thread_processor_count();
-    uint32_t *depths[] = {&r.max_depth, &r.max_transparent_depth, &r.max_glossy_depth,
-                          &r.max_transmission_depth};
+    if (r.max_shadow_depth == UINT32_MAX)
+        r.max_shadow_depth = r.max_transparent_depth;
+    uint32_t *depths[] = {&r.max_depth, &r.max_transparent_depth, &r.max_shadow_depth,
+                          &r.max_glossy_depth, &r.max_transmission_depth};
     for (size_t i = 0; i < sizeof depths / sizeof *depths; i++) {
         if (*depths[i] > TRC_MAX_DEPTH)
             *depths[i] = TRC_MAX_DEPTH;

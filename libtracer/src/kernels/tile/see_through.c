@@ -85,7 +85,7 @@ static vmask may_pass(const struct trc_tile *t, vint order, vmask m) {
     const vuint depths = vu_gather(t->shadows.depths, order, m);
     const vint passed = (vint)vu_gather(t->shadows.passed, order, m);
     const vint before = (vint)trc_depth_of(depths, TRC_DEPTH_TRANSPARENT_SHIFT);
-    return vm_and(m, vi_lt(before + passed, vi_set((int32_t)t->desc->max_transparent_depth)));
+    return vm_and(m, vi_lt(before + passed, vi_set((int32_t)t->desc->max_shadow_depth)));
 }
 
 /* Lanes whose rays leave a ball that has taken its part where they came in: shadow rays of Cycles 5
