@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Normals far from the geometry's, of smooth meshes and given to shaders, each shader beside Cycles: a square seen
 straight on whose normals are turned by so many degrees, under a sun without size, so that nothing is random, and in
-an even world, whose light Cycles' rays find, not its samples of lights."""
+an even world, whose light Cycles' rays find, not its samples of lights. Given normals may have any length, as colours
+that are linked to them have."""
 
 import math
 
@@ -15,6 +16,8 @@ RELATIVE, ABSOLUTE = 0.01, 3e-4
 # In the world of radiance 1.
 WORLD_SIZE, WORLD_SAMPLES, WORLD_ABSOLUTE = (16, 16), 256, 2e-3
 IN_WORLD = "diffuse", "rough diffuse", "translucent", "velvet", "velvet node"
+LENGTHS, LENGTHS_DEGREES = (0.0, 0.4, 1.7), 20
+LENGTHS_3 = LENGTHS[:1]  # Cycles 3.4 takes others as they are, of which not all is followed
 
 _BASE = {"Base Color": (0.8, 0.8, 0.8)}
 _BARE = {"Base Color": (0.0, 0.0, 0.0), "IOR": 1.0, "Specular IOR Level": 0.0}
@@ -82,14 +85,15 @@ def _shader(name, normal):
     return made
 
 
-def _stage(name, is_smooth, degrees, size):
-    """The square of a shader before a camera, alone; False where this Blender lacks the shader."""
+def _stage(name, is_smooth, degrees, size, length=1.0):
+    """The square of a shader before a camera, alone; False where this Blender lacks the shader. length: that of the
+    normal that is given."""
     import scenes
     scenes.empty(size=size)
     camera = scenes.camera(location=(0, -5, 0))
     camera.data.type, camera.data.ortho_scale = 'ORTHO', 1.0
     square, normal = _square(math.radians(degrees), is_smooth)
-    made = _shader(name, None if is_smooth else normal)
+    made = _shader(name, None if is_smooth else [length * part for part in normal])
     if made is None:
         return False
     square.data.materials.clear()
@@ -102,10 +106,17 @@ def _means_by_both(samples):
     return [float(picture[..., :3].mean()) for picture in scenes.by_both(samples)]
 
 
-def inside_means():
-    """{(shader, whether it is smooth, degrees of the sun, of the normal): (ours, theirs)}."""
+def _shine(degrees):
+    """Light the square by a sun so far from the view."""
     import scenes
     from mathutils import Vector
+    turn = math.radians(degrees)
+    light = scenes.light('SUN', energy=3.0, angle=0.0)
+    light.rotation_euler = Vector((math.sin(turn), -math.cos(turn), 0.0)).to_track_quat('Z', 'Y').to_euler()
+
+
+def inside_means():
+    """{(shader, whether it is smooth, degrees of the sun, of the normal): (ours, theirs)}."""
     means = {}
     for name in _SHADERS:
         for is_smooth in (True, False):
@@ -113,11 +124,20 @@ def inside_means():
                 for degrees in TURNS_DEGREES:
                     if not _stage(name, is_smooth, degrees, (4, 4)):
                         continue
-                    sun = math.radians(sun_degrees)
-                    light = scenes.light('SUN', energy=3.0, angle=0.0)
-                    to_light = Vector((math.sin(sun), -math.cos(sun), 0.0))
-                    light.rotation_euler = to_light.to_track_quat('Z', 'Y').to_euler()
+                    _shine(sun_degrees)
                     means[name, is_smooth, sun_degrees, degrees] = _means_by_both(SAMPLES)
+    return means
+
+
+def inside_means_of_lengths():
+    """{(shader, length of the normal): (ours, theirs)}."""
+    import bpy
+    means = {}
+    for name in _SHADERS.keys() - _LOOSER.keys():
+        for length in LENGTHS if bpy.app.version >= (4, 0, 0) else LENGTHS_3:
+            if _stage(name, False, LENGTHS_DEGREES, (4, 4), length):
+                _shine(SUNS_DEGREES[0])
+                means[name, length] = _means_by_both(SAMPLES)
     return means
 
 
@@ -179,3 +199,12 @@ def test_in_even_world(all_means_in_world, name, is_smooth):
     assert len(means) == len(TURNS_DEGREES)
     for (degrees,), (ours, theirs) in means.items():
         assert ours == pytest.approx(theirs, rel=RELATIVE, abs=WORLD_ABSOLUTE), f"normal at {degrees} degrees"
+
+
+def test_lengths(blender):
+    """Taken as they are, diffuse surfaces had .4, 1.7 and none of the light that they have in Cycles 4 and 5, glossy
+    ones up to five times as much; in 3.4 those of no length .7 and five times."""
+    means = blender.run(inside_means_of_lengths, timeout=300)
+    assert ("Principled gloss", LENGTHS[0]) in means
+    for (name, length), (ours, theirs) in means.items():
+        assert ours == pytest.approx(theirs, rel=RELATIVE, abs=ABSOLUTE), f"{name}, {length} long"

@@ -442,8 +442,9 @@ enum trc_material_flags {
      * they share it with samples of lights that Hair gives nothing of, and lose that part. */
     TRC_MATERIAL_LIGHT_TREE = 16,
     /* Lobes without microfacets (diffuse, translucent, sheen, velvet, toon) take normals as they
-     * are (Cycles 4 and 5); else these are turned back until a mirror would reflect the view above
-     * the surface, as those of all other lobes are (Cycles 3.4). */
+     * are, and those of all lobes are made as long as 1 (Cycles 4 and 5); else these are turned
+     * back until a mirror would reflect the view above the surface, as those of all other lobes
+     * are, and keep their length (Cycles 3.4). */
     TRC_MATERIAL_KEEPS_NORMALS = 32,
     /* What the camera sees of a holdout that is made of it: what is transparent stays so, and all
      * else, emission too, is a hole in the film. */

@@ -8,16 +8,27 @@
 
 /* ---- normals and tangents ---- */
 
+/* What a normal is linked to may have any length, as a colour has; without any, it is the
+ * surface's. */
+static vvec3 linked_normal(const struct trc_setup *c, const struct trc_leaf *leaf, uint32_t at) {
+    const vvec3 n = colour(c, leaf, at);
+    if (!(c->material->flags & TRC_MATERIAL_KEEPS_NORMALS))
+        return n;
+    vfloat length;
+    const vvec3 unit = v3_normalize_length(n, &length);
+    return v3_select(vf_gt(length, vf_zero()), unit, c->s->n);
+}
+
 vvec3 trc_leaf_normal(struct trc_setup *c, const struct trc_leaf *leaf, uint32_t at) {
     if (!is_unlinked(c, leaf, at))
-        return valid_normal(c->s, colour(c, leaf, at));
+        return valid_normal(c->s, linked_normal(c, leaf, at));
     return trc_default_normal(c);
 }
 
 vvec3 trc_matt_normal(struct trc_setup *c, const struct trc_leaf *leaf, uint32_t at) {
     if (!(c->material->flags & TRC_MATERIAL_KEEPS_NORMALS))
         return trc_leaf_normal(c, leaf, at);
-    return is_unlinked(c, leaf, at) ? c->s->n : colour(c, leaf, at);
+    return is_unlinked(c, leaf, at) ? c->s->n : linked_normal(c, leaf, at);
 }
 
 vvec3 trc_default_normal(struct trc_setup *c) {

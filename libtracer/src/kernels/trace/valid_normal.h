@@ -52,7 +52,9 @@ static vvec3 valid_normal(const struct trc_surface *s, vvec3 n) {
     vmask found;
     choose_bend(half * (c + b), half * (c - b), ix, iz, &x, &z, &found);
     const vvec3 turned = v3_mad(across, x, v3_scale(s->ng, z));
-    return v3_select(bad, v3_select(found, turned, s->ng), n);
+    /* What is too short, or of no length, has no side to turn from. */
+    const vmask turns = vm_and(found, vf_gt(v3_dot(across, across), vf_zero()));
+    return v3_select(bad, v3_select(turns, turned, s->ng), n);
 }
 
 #endif
