@@ -275,3 +275,55 @@ def test_what_blender_unrolls(blender):
     assert ours[8, 24, :3] == pytest.approx((0.8, 0.3, 0.1), rel=1e-5)
     for x in (8, 24):
         assert abs(ours - theirs)[5:11, x - 3:x + 3].max() < 1e-5
+
+
+def _for_each_engine(material):
+    """Give Eevee an output of its own, black, and what there is to Cycles: its tree."""
+    tree = material.node_tree
+    tree.nodes["Material Output"].target = 'CYCLES'
+    other = tree.nodes.new("ShaderNodeOutputMaterial")
+    other.target = 'EEVEE'
+    tree.links.new(tree.nodes.new("ShaderNodeEmission").outputs[0], other.inputs["Surface"])
+    other.is_active_output = True
+    return tree
+
+
+def inside_outputs_by_engine():
+    """A wall whose tree has a node of an add-on that is gone, by Volley and by Cycles, and what Volley warns of a tree
+    with a repeat zone."""
+    import bpy
+    import scenes
+    from volley.sync import flatten, inlined
+
+    class Gone(bpy.types.Node):
+        """A node of an add-on."""
+
+        bl_idname, bl_label = "GoneNode", "Gone"
+
+    scenes.empty(size=(16, 16))
+    scenes.camera()
+    material = scenes.emitter((0.2, 0.4, 0.6))
+    scenes.wall("Wall", 6.0, 0.0, material=material)
+    bpy.utils.register_class(Gone)
+    _for_each_engine(material).nodes.new(Gone.bl_idname)
+    bpy.utils.unregister_class(Gone)
+    pictures = scenes.by_both(4)
+    told = set()
+    if bpy.app.version >= (5, 0, 0):
+        tree = _for_each_engine(scenes.emitter((0.2, 0.4, 0.6), "Repeated"))
+        begin, end = (tree.nodes.new(f"GeometryNodeRepeat{side}put") for side in ("In", "Out"))
+        begin.pair_with_output(end)
+        end.repeat_items.new('FLOAT', "Sum")
+        tree.links.new(end.outputs["Sum"], tree.nodes["Emission"].inputs["Strength"])
+        with inlined.shader_tree(bpy.data.materials["Repeated"]) as (read, _):
+            flatten.flatten(read, "Repeated", told)
+    return pictures, sorted(told)
+
+
+def test_outputs_by_engine(blender):
+    """Blender's inlined trees lack outputs for one engine alone: the wall was black."""
+    import blender as blender_support
+    (ours, theirs), told = blender.run(inside_outputs_by_engine)
+    assert ours[8, 8, :3] == pytest.approx((0.2, 0.4, 0.6), rel=1e-5)
+    assert abs(ours - theirs).max() < 1e-5
+    assert [line for line in told if "Repeat" in line] or blender_support.version() < (5, 0)
