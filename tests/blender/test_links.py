@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What comes through muted nodes, reroutes and groups beside Cycles, on a wall that shines before a grey world. Means
-and tiles within 1 %, beyond what noise explains. The table goes to results/links.txt of the build."""
+"""What comes through muted nodes, reroutes and groups, and out of long chains and large mixes beside Cycles, on a wall
+that shines before a grey world. Means and tiles within 1 %, beyond what noise explains. The table goes to results/links.txt of the build."""
 
 import blender as blender_support
 import compare
@@ -237,6 +237,88 @@ def _empty_output(wall):
     wall.tree.links.remove(wall.output.inputs["Surface"].links[0])
 
 
+def _chain(wall, value, kinds, settings=()):
+    """A number that goes through nodes of those kinds, by their first inputs."""
+    for kind, node_settings in zip(kinds, settings or [((), {})] * len(kinds)):
+        values, named = node_settings
+        node = wall.add(kind, None, *values, **named)
+        wall.tree.links.new(value.outputs[0], node.inputs[0])  # reroutes have other sockets then
+        value = node
+    return value
+
+
+def _long_chain(wall):
+    """A thousand Math nodes, half of which add what the others take away but for a thousandth."""
+    steps = [((0.001,), {"operation": 'ADD'}), ((0.9995,), {"operation": 'MULTIPLY'})] * 500
+    wall.show(_chain(wall, _coordinate(1.0, 0.0)(wall), ["ShaderNodeMath"] * len(steps), steps))
+
+
+def _long_mixes(wall):
+    """Three hundred mixes of colours, each of which is the factor and a colour of the next."""
+    color = wall.add("ShaderNodeTexCoord").outputs["UV"]
+    for number in range(300):
+        mix = wall.add("ShaderNodeMixRGB", None, None, (0.9 - 0.002 * number, 0.3, 0.002 * number, 1.0),
+                       blend_type='SCREEN' if number % 2 else 'MULTIPLY')
+        wall.link(color, mix.inputs[0])
+        wall.link(color, mix.inputs[1])
+        color = mix.outputs[0]
+    wall.link(color, wall.emission.inputs["Color"])
+
+
+def _long_reroutes(wall):
+    wall.show(_chain(wall, _coordinate(1.0, 0.0)(wall), ["NodeReroute"] * 600))
+
+
+def _deep_groups(wall):
+    """Fifty groups in each other, each of which adds to what the one in it makes."""
+    inner = None
+    for number in range(50):
+        group, begin, end = wall.group({"Given": 'Float'}, 'Float')
+        tree = group.node_tree
+        value = begin
+        if inner is not None:
+            value = wall.add("ShaderNodeGroup", tree=tree, node_tree=inner.node_tree)
+            wall.link(begin.outputs[0], value.inputs[0])
+            wall.tree.nodes.remove(inner)
+        added = wall.add("ShaderNodeMath", None, 0.01 + 0.0001 * number, tree=tree)
+        wall.link(value.outputs[0], added.inputs[0])
+        wall.link(added.outputs[0], end.inputs[0])
+        inner = group
+    wall.link(_coordinate(1.0, 0.0)(wall).outputs[0], inner.inputs[0])
+    wall.show(inner)
+
+
+def _many_shaders(kinds, count=64, **values):
+    """Under a sun, a mix of shaders of colours of their own, about as much of each."""
+    def build(wall):
+        import scenes
+        scenes.light('SUN', rotation=(1.2, 0.3, 0.0), energy=3.0)
+        noise = wall.add("ShaderNodeTexNoise", None, None, 3.0)
+        coordinate = _coordinate(1.0, 0.0)(wall)
+        shown = None
+        for number in range(count):
+            shader = wall.add(kinds[number % len(kinds)])
+            for name, value in values.items():
+                if name in shader.inputs:
+                    shader.inputs[name].default_value = value
+            tinted = wall.add("ShaderNodeMixRGB", 0.5, None,
+                              (0.9 - 0.01 * number, number % 3 / 3, 0.01 * number, 1.0))
+            wall.link(noise.outputs["Color"], tinted.inputs[1])
+            wall.link(tinted.outputs[0], shader.inputs[0])
+            if shown is None:
+                shown = shader
+                continue
+            factor = wall.add("ShaderNodeMath", None, 0.8 / (number + 1), 0.6 / (number + 1), operation='MULTIPLY_ADD')
+            wall.link(coordinate.outputs[0], factor.inputs[0])
+            mix = wall.add("ShaderNodeMixShader")
+            wall.link(factor.outputs[0], mix.inputs[0])
+            wall.link(shown.outputs[0], mix.inputs[1])
+            wall.link(shader.outputs[0], mix.inputs[2])
+            shown = mix
+        wall.link(shown.outputs[0], wall.output.inputs["Surface"])
+    return build
+
+
 LOOSE = {
     "muted mix": _muted("ShaderNodeMixRGB", None, COLOR, COLOR),
     "muted number": _muted("ShaderNodeMath", 0.3),
@@ -286,7 +368,18 @@ OUTPUTS = {
     "muted output": _muted_output,
     "muted output in a group": _muted_output_in_group,
 }
-CASES = {**LOOSE, **GROUPS, **KINDS, **OUTPUTS}
+# Chains of more than 120 nodes were cut, mixes of more than 16 shaders had the default material: off by up to all of the
+# picture.
+LARGE = {
+    "a thousand numbers": _long_chain,
+    "three hundred mixes": _long_mixes,
+    "six hundred reroutes": _long_reroutes,
+    "fifty groups in each other": _deep_groups,
+    "64 diffuse shaders": _many_shaders(["ShaderNodeBsdfDiffuse"]),
+    "64 shaders": _many_shaders(["ShaderNodeBsdfDiffuse", "ShaderNodeBsdfGlossy", "ShaderNodeBsdfTranslucent",
+                                 "ShaderNodeEmission"], Roughness=0.6),
+}
+CASES = {**LOOSE, **GROUPS, **KINDS, **OUTPUTS, **LARGE}
 
 
 def inside_pictures(names):

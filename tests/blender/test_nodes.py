@@ -172,7 +172,7 @@ def inside_loop():
 
 def test_deep_and_looped_trees_end(blender):
     deep, loop, empty = blender.run(inside_loop)
-    assert len(deep["warnings"]) == 1 and deep["nodes"]
+    assert not deep["warnings"] and len(deep["nodes"]) > 200
     assert loop["nodes"][loop["surface"]][0] == 7
     assert empty["surface"] == -1 and empty["nodes"] == []
 

@@ -22,10 +22,11 @@
 
 #define GRAPH_INLINE static inline __attribute__((unused))
 
-#define MAX_INPUTS (TRC_MAX_NODES * 4)
+#define MAX_GRAPH_NODES 4096
+#define MAX_INPUTS (MAX_GRAPH_NODES * 4)
 
 static struct graph {
-    trc_node nodes[TRC_MAX_NODES];
+    trc_node nodes[MAX_GRAPH_NODES];
     trc_node_input inputs[MAX_INPUTS];
     uint32_t node_count, input_count;
     int32_t surface;

@@ -237,17 +237,17 @@ static void test_too_many_registers(void **state) {
     (void)state;
     graph_clear();
     const int32_t info = add(TRC_NODE_OBJECT_INFO, 0, 0, NULL);
-    int32_t values[300];
-    for (int i = 0; i < 300; i++) {
+    int32_t values[TRC_MAX_REGISTERS + 1];
+    for (int i = 0; i <= TRC_MAX_REGISTERS; i++) {
         values[i] =
             ADD(TRC_NODE_MATH, TRC_MATH_ADD, link_to(info, 5), value(1 + (float)i), value(0));
     }
     int32_t sum = values[0];
-    for (int i = 1; i < 300; i++) {
+    for (int i = 1; i <= TRC_MAX_REGISTERS; i++) {
         sum = ADD(TRC_NODE_MATH, TRC_MATH_ADD, link_to(sum, 0), link_to(values[i], 0), value(0));
     }
     add_diffuse(link_to(sum, 0));
-    refused(TRC_ERROR_TOO_LARGE, "256", "values");
+    refused(TRC_ERROR_TOO_LARGE, "1024", "values");
 }
 
 static void test_too_many_leaves(void **state) {
@@ -258,7 +258,7 @@ static void test_too_many_leaves(void **state) {
         const int32_t leaf = add_diffuse(color(1, 1, 1));
         sum = ADD(TRC_NODE_ADD_SHADER, 0, link_to(sum, 0), link_to(leaf, 0));
     }
-    refused(TRC_ERROR_TOO_LARGE, "16", "shaders");
+    refused(TRC_ERROR_TOO_LARGE, "64", "shaders");
 }
 
 /* A ladder of mixes that all share their shaders: its tree would have 2^1000 leaves. */

@@ -13,8 +13,9 @@ import math
 
 from ..abi import DisplacementMethod, MathOperation as Math, NodeType, VectorOperation as Vector
 from ..compat import BUMP_FILTER_WIDTH, HAS_BOOLEAN_SOCKETS, INLINES_GROUPS, aov_name
-from . import nodes, working_space
+from . import nodes, tree_links, working_space
 from .node_list import input_number, output, takes_generated
+from .tree_links import MAX_GROUPS
 from .values import CONSTANT, DEFAULT, NO_SHADER, Value
 
 _KINDS = {'VALUE': 'f', 'INT': 'f', 'BOOLEAN': 'f', 'RGBA': 'c', 'VECTOR': 'v', 'ROTATION': 'v',
@@ -27,7 +28,8 @@ _FOLDED = {NodeType.MATH, NodeType.VECTOR_MATH, NodeType.COMBINE, NodeType.SEPAR
 _WITHOUT_DEFAULT = {
     ("ShaderNodeVectorRotate", "Vector"), ("ShaderNodeMapRange", "Vector"), ("ShaderNodeTexWhiteNoise", "Vector"),
     ("ShaderNodeBsdfRayPortal", "Direction"), ("ShaderNodeOutputMaterial", "Displacement")}
-_MAX_DEPTH = 120  # nodes in a chain; Python's own stack ends at about a thousand calls
+# Python's own stack ends at about a thousand calls, which a link takes up to ten of.
+_MAX_LINKS = 30    # in a chain that is walked at once; longer ones are walked from their far ends, piece by piece
 
 
 class FlatNode:
@@ -101,7 +103,7 @@ def flatten(tree, label, warnings, images=None, aovs=None, attributes=None, disp
     none."""
     walker = Walker(label, warnings, images, attributes)
     walker.is_of_world = is_of_world
-    sockets = _end_sockets(_ends(tree))
+    sockets = _end_sockets(_ends(tree), walker.links)
     if "Volume" in sockets:
         warnings.add(f"{label}: volume is not supported and is left out")
     walker.is_displaced = displacement is not None and "Displacement" in sockets
@@ -134,13 +136,13 @@ def _ends(tree, path=()):
 
 def _is_entered(node, path):
     """Whether a node on a path is a group in which nodes work by themselves, not by what is linked to it."""
-    return node.type == 'GROUP' and not node.mute and node.node_tree is not None and len(path) < _MAX_DEPTH
+    return node.type == 'GROUP' and not node.mute and node.node_tree is not None and len(path) < MAX_GROUPS
 
 
-def _end_sockets(ends):
+def _end_sockets(ends, links):
     """{identifier: (socket, path)} of what is linked to outputs: each socket of the first where it is."""
     return {socket.identifier: (socket, path) for end, path in reversed(ends) for socket in end.inputs
-            if _source(socket) is not None}
+            if links.source(socket) is not None}
 
 
 class Walker:
@@ -149,12 +151,16 @@ class Walker:
     def __init__(self, label, warnings, images=None, attributes=None):
         self.flat = FlatTree()
         self.label, self.attributes = label, attributes
+        self.links = tree_links.TreeLinks()
         self.is_displaced = False  # the material has a displacement
         self.is_of_world = False
         self._warnings = warnings
         self._images = images
         self._done = {}       # (path names, node name) -> {output identifier: Value}
         self._active = set()  # the nodes being walked, to notice loops
+        self._passed = {}     # (path names, node name, output identifier) -> Value, of what passes values on
+        self._heights = {}    # the same key -> links below it, of outputs at the end of long chains
+        self._depth = 0       # links on the way to what is being walked
 
     def warn(self, text):
         """Add a message about this tree."""
@@ -215,7 +221,7 @@ class Walker:
 
     def input_value(self, socket, path):
         """What an input socket holds, in the socket's own kind."""
-        source = _source(socket)
+        source = self.links.source(socket)
         value = None if source is None else self._output_value(source, path)
         if value is None or value.is_loose and _has_default(socket):
             return _unlinked(socket)
@@ -223,12 +229,45 @@ class Walker:
 
     def is_linked(self, socket):
         """Whether a link that counts ends at the socket."""
-        return _source(socket) is not None
+        return self.links.source(socket) is not None
 
     # Outputs
 
     def _output_value(self, socket, path):
         """The value of an output socket, None where nothing is supported behind it."""
+        if self._depth == _MAX_LINKS:
+            self._walk_below(socket, path)
+        self._depth += 1
+        if tree_links.passes_on(socket.node):
+            key = tree_links.key_of(socket, path)
+            if key not in self._passed:
+                self._passed[key] = self._value_passed_on(socket, path)
+            value = self._passed[key]
+        else:
+            value = self._node_outputs(socket.node, path).get(socket.identifier)
+        self._depth -= 1
+        return value
+
+    def _walk_below(self, socket, path):
+        """Have the values along the chains that end at an output, from their far ends, as often as keeps the way
+        from one to the next short."""
+        waiting, depth = [(socket, path, False)], self._depth
+        while waiting:
+            socket, path, is_below_known = waiting.pop()
+            key = tree_links.key_of(socket, path)
+            if is_below_known:
+                self._heights[key] = 1 + max(
+                    (self._heights[tree_links.key_of(*each)] for each in self.links.sources(socket, path)), default=0)
+                if self._heights[key] % _MAX_LINKS == 0:
+                    self._depth = 0
+                    self._output_value(socket, path)
+            elif key not in self._heights:
+                self._heights[key] = 0  # until it is known, and in a loop
+                waiting.append((socket, path, True))
+                waiting.extend((*each, False) for each in self.links.sources(socket, path))
+        self._depth = depth
+
+    def _value_passed_on(self, socket, path):
         node = socket.node
         if node.mute:
             return self._through_muted(node, socket, path)
@@ -236,21 +275,17 @@ class Walker:
             return self._passed_on(node.inputs[0], socket, path, _nothing(socket))
         if node.type == 'GROUP':
             return self._into_group(node, socket, path)
-        if node.type == 'GROUP_INPUT':
-            return self._out_of_group(socket, path)
-        return self._node_outputs(node, path).get(socket.identifier)
+        return self._out_of_group(socket, path)
 
     def _through_muted(self, node, socket, path):
-        for link in node.internal_links:
-            if link.to_socket == socket:
-                return self._passed_on(link.from_socket, socket, path, _nothing(socket))
-        return None
+        inside = tree_links.muted_input(node, socket)
+        return None if inside is None else self._passed_on(inside, socket, path, _nothing(socket))
 
     def _passed_on(self, socket, end, path, otherwise):
         """What comes to a socket and leaves at an output, end; otherwise, where nothing comes."""
         if end.type == 'BOOLEAN' and not HAS_BOOLEAN_SOCKETS:
             return None
-        source = _source(socket)
+        source = self.links.source(socket)
         value = None if source is None else self._output_value(source, path)
         if value is None:
             return otherwise
@@ -260,29 +295,25 @@ class Walker:
         tree = node.node_tree
         if tree is None:
             return _nothing(socket)
-        if len(path) >= _MAX_DEPTH or any(entered.node_tree == tree for entered in path):
+        if tree_links.is_too_deep(tree, path):
             self.warn(f"group '{tree.name}' contains itself, its value is left out")
             return None
-        outputs = [n for n in tree.nodes if n.type == 'GROUP_OUTPUT']
-        active = next((n for n in outputs if n.is_active_output), outputs[0] if outputs else None)
+        active = tree_links.active_output(tree)
         if active is None:
             return _nothing(socket)
-        inside = next((s for s in active.inputs if s.identifier == socket.identifier), None)
+        inside = tree_links.same(active.inputs, socket)
         return None if inside is None else self._passed_on(inside, socket, path + (node,), _held(inside))
 
     def _out_of_group(self, socket, path):
-        if not path:
-            return None
-        group = path[-1]
-        outside = next((s for s in group.inputs if s.identifier == socket.identifier), None)
+        outside = tree_links.same(path[-1].inputs, socket) if path else None
         return None if outside is None else self._passed_on(outside, socket, path[:-1], _held(outside))
 
     def _node_outputs(self, node, path):
-        key = (tuple(group.name for group in path), node.name)
+        key = (tree_links.names(path), node.name)
         if key in self._done:
             return self._done[key]
-        if key in self._active or len(self._active) >= _MAX_DEPTH:
-            self.warn(f"node '{node.name}' is in a loop or too deep, its value is left out")
+        if key in self._active:
+            self.warn(f"node '{node.name}' is in a loop, its value is left out")
             return {}
         self._active.add(key)
         outputs = nodes.translate(self, node, path)
@@ -358,17 +389,6 @@ class Walker:
         color = self.convert(value, 'c')
         one = Value('f', CONSTANT, 0, (1.0, 0.0, 0.0))
         return Value('s', self.emit(NodeType.EMISSION, (color, one)), 0)
-
-
-def _source(socket):
-    """The output socket that feeds an input, None without a link that counts. Sockets that a node's settings
-    hide keep their links."""
-    if not socket.is_linked or socket.is_unavailable:
-        return None
-    for link in socket.links:
-        if link.is_valid and not link.is_muted and not link.from_socket.is_unavailable:
-            return link.from_socket
-    return None
 
 
 def _kind(socket):

@@ -11,7 +11,7 @@
 
 TRC_BEGIN_DECLS
 
-#define TRC_MAX_NODES 4096
+#define TRC_MAX_NODES 65536
 #define TRC_MAX_NODE_INPUTS 32
 
 enum trc_node_type {

@@ -11,8 +11,8 @@
 
 #include "tracer/tracer.h"
 
-#define TRC_MAX_LEAVES 16
-#define TRC_MAX_REGISTERS 256
+#define TRC_MAX_LEAVES 64 /* as many as Cycles has closures */
+#define TRC_MAX_REGISTERS 1024
 
 /* Lobes whose mean weight is below it are dropped, lane by lane (Cycles' closure cut-off). */
 #define TRC_WEIGHT_CUTOFF 1e-5f

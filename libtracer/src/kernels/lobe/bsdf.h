@@ -9,7 +9,7 @@
 #include "kernels/program/program.h"
 #include "kernels/simd/simd.h"
 
-#define TRC_MAX_LOBES 24
+#define TRC_MAX_LOBES 64
 
 /* Which side and which passes a lobe's light belongs to, and whether rays are continued for it. */
 enum trc_lobe_kind {
