@@ -8,7 +8,7 @@ TRC_BEGIN_DECLS
 
 /* Most motion keys of one object, and most UV maps or colour attributes of one mesh. */
 #define TRC_MAX_KEYS 33
-#define TRC_MAX_ATTRIBUTES 8
+#define TRC_MAX_ATTRIBUTES 64
 
 enum trc_normals_layout { TRC_NORMALS_NONE = 0, TRC_NORMALS_VERTEX = 1, TRC_NORMALS_CORNER = 2 };
 
