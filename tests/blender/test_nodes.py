@@ -177,6 +177,27 @@ def test_deep_and_looped_trees_end(blender):
     assert empty["surface"] == -1 and empty["nodes"] == []
 
 
+def inside_bent_blends():
+    """The warnings of mixes by a factor that is not clamped."""
+    told = {}
+    for blend in ('MIX', 'BURN'):
+        tree, output = _new_tree()
+        mix = tree.nodes.new("ShaderNodeMix")
+        mix.data_type, mix.blend_type, mix.clamp_factor = 'RGBA', blend, False
+        mix.inputs["Factor"].default_value = 0.5
+        tree.links.new(next(each for each in mix.outputs if each.enabled), output.inputs["Surface"])
+        told[f"{blend}, .5"] = _flat(tree)["warnings"]
+        tree.links.new(tree.nodes.new("ShaderNodeObjectInfo").outputs["Random"], mix.inputs["Factor"])
+        told[blend] = _flat(tree)["warnings"]
+    return told
+
+
+def test_blends_not_linear_in_their_factor_are_named(blender):
+    told = blender.run(inside_bent_blends)
+    assert not told["MIX"] and not told["MIX, .5"] and not told["BURN, .5"]
+    assert len(told["BURN"]) == 1 and "clamped" in told["BURN"][0]
+
+
 def inside_textures():
     tree, output = _new_tree()
     emission, color = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeMixRGB")

@@ -204,6 +204,14 @@ for _blend in _BLENDS:
          Factor=0.6, A='color', B=(0.7, 0.3, 0.5))
     _add(f"mix {_blend}, the second varies", "ShaderNodeMixRGB", ("Color",),
          {"blend_type": _blend, "use_clamp": True}, Fac=0.8, Color1=(0.7, 0.3, 0.5), Color2='color')
+    if _blend not in {"BURN", "DODGE", "SATURATION", "VALUE", "EXCLUSION"}:  # those are named in a warning
+        # Factors below 0 and above 1 were clamped: off by up to half of them.
+        _add(f"mix {_blend}, factor beyond", "ShaderNodeMix", ("Result",),
+             {"data_type": 'RGBA', "blend_type": _blend, "clamp_factor": False}, Factor=(-0.5, 1.5), A='color',
+             B=(0.7, 0.3, 0.5))
+_add("mix MULTIPLY, factor beyond, clamped", "ShaderNodeMix", ("Result",),
+     {"data_type": 'RGBA', "blend_type": 'MULTIPLY', "clamp_factor": False, "clamp_result": True},
+     Factor=(-0.5, 1.5), A='color', B=(0.7, 0.3, 0.5))
 _add("mix ADD, clamped", "ShaderNodeMix", ("Result",),
      {"data_type": 'RGBA', "blend_type": 'ADD', "clamp_result": True}, Factor=0.9, A='color',
      B=(0.7, 0.3, 0.5))

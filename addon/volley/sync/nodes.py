@@ -42,6 +42,7 @@ _LAYERED_MODES = ((DistributionType.FILMED_METAL if HAS_FILMED_METAL else 0) |
                   (DistributionType.WHOLE_COAT if HAS_WHOLE_COAT else 0))
 
 _BLENDS, _MATH_OPERATIONS = BlendMode.__members__, Math.__members__
+_BENT_BLENDS = {'BURN', 'DODGE', 'SATURATION', 'VALUE', 'EXCLUSION'}  # whose colours are not linear in the factor
 _VECTOR_OPERATIONS = {
     **Vector.__members__, 'CROSS_PRODUCT': Vector.CROSS,
     'DOT_PRODUCT': Vector.DOT, 'FRACTION': Vector.FRACT}
@@ -665,10 +666,35 @@ def _mix(walker, node, sockets):
         return {"Result_Vector": _mix_vectors(walker, node, sockets)}
     if node.data_type != 'RGBA' or node.blend_type not in _BLENDS:
         return None
+    factor, first, second = (sockets.get(kind, name) for kind, name in (
+        ('f', "Factor_Float"), ('c', "A_Color"), ('c', "B_Color")))
+    mix = _blend if node.clamp_factor or _is_fraction(factor) else _blend_beyond
+    return {"Result_Color": mix(walker, node, factor, first, second)}
+
+
+def _is_fraction(value):
+    return value.node == CONSTANT and 0.0 <= value.constant[0] <= 1.0
+
+
+def _blend(walker, node, factor, first, second):
+    """Two colours mixed by a factor that is clamped."""
     mode = _BLENDS[node.blend_type] | (ModeFlags.CLAMP if node.clamp_result else 0)
-    values = (_clamped(walker, sockets.get('f', "Factor_Float"), node.clamp_factor),
-              sockets.get('c', "A_Color"), sockets.get('c', "B_Color"))
-    return {"Result_Color": Value('c', walker.emit(NodeType.MIX_COLOR, values, mode), 0)}
+    return Value('c', walker.emit(NodeType.MIX_COLOR, (factor, first, second), mode), 0)
+
+
+def _blend_beyond(walker, node, factor, first, second):
+    """The same by any factor, straight on from where it is 0 and 1."""
+    if node.blend_type in _BENT_BLENDS:
+        walker.warn(f"node '{node.name}': a factor beyond 0 and 1 is clamped, as its blending is not linear in it")
+        return _blend(walker, node, factor, first, second)
+    whole = second if node.blend_type == 'MIX' else Value('c', walker.emit(
+        NodeType.MIX_COLOR, (_constant('f', 1.0), first, second), _BLENDS[node.blend_type]), 0)
+    difference = _vector(walker, Vector.SUBTRACT, whole._replace(kind='v'), first._replace(kind='v'))
+    mixed = _vector(walker, Vector.MULTIPLY_ADD, difference, walker.convert(factor, 'v'), first._replace(kind='v'))
+    if node.clamp_result:
+        mixed = _vector(walker, Vector.MINIMUM, _vector(walker, Vector.MAXIMUM, mixed, _constant('v', 0.0)),
+                        _constant('v', 1.0))
+    return mixed._replace(kind='c')
 
 
 def _mix_vectors(walker, node, sockets):
