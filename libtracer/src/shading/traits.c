@@ -54,7 +54,7 @@ static uint32_t microfacet_bits(uint32_t distribution, struct trc_operand roughn
         return TRC_MATERIAL_HAS_SPECULAR;
     if (!trc_is_constant(roughness))
         return roughness_bits(0.0f, INFINITY);
-    const float r = fmaxf(roughness.value, 0.0f);
+    const float r = fabsf(roughness.value); /* its square counts */
     return roughness_bits(r, r);
 }
 

@@ -1,5 +1,7 @@
 /* From the leaves of a material to lobes, as Cycles sets up its closures: normals and tangents, the
  * closures of the leaves, chances. */
+#include <math.h>
+
 #include "kernels/lobe/lobe.h"
 #include "kernels/trace/valid_normal.h"
 
@@ -8,15 +10,16 @@
 
 /* ---- normals and tangents ---- */
 
-/* What a normal is linked to may have any length, as a colour has; without any, it is the
- * surface's. */
+/* What a normal is linked to may have any length, as a colour has; without a direction, it is the
+ * surface's in Cycles 4 and 5, and what valid_normal makes of it in 3.4. */
 static vvec3 linked_normal(const struct trc_setup *c, const struct trc_leaf *leaf, uint32_t at) {
     const vvec3 n = colour(c, leaf, at);
     if (!(c->material->flags & TRC_MATERIAL_KEEPS_NORMALS))
         return n;
     vfloat length;
     const vvec3 unit = v3_normalize_length(n, &length);
-    return v3_select(vf_gt(length, vf_zero()), unit, c->s->n);
+    const vmask fine = vm_and(vf_gt(length, vf_zero()), vf_lt(length, vf_set(INFINITY)));
+    return v3_select(fine, unit, c->s->n);
 }
 
 vvec3 trc_leaf_normal(struct trc_setup *c, const struct trc_leaf *leaf, uint32_t at) {

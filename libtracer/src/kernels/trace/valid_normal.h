@@ -35,11 +35,13 @@ static void choose_bend(vfloat first2, vfloat second2, vfloat ix, vfloat iz, vfl
 
 /* Turns n towards the geometric normal as little as makes the mirror direction of wo rise above the
  * surface by a threshold t. With z = ng and x = the part of n across it, the turned normal (x, 0,
- * z) satisfies 2 (x ix + z iz) z - iz = t, a quadratic in z^2 because x^2 = 1 - z^2. */
+ * z) satisfies 2 (x ix + z iz) z - iz = t, a quadratic in z^2 because x^2 = 1 - z^2. The geometric
+ * normal stands in for what has no direction. */
 static vvec3 valid_normal(const struct trc_surface *s, vvec3 n) {
     const vfloat iz = v3_dot(s->ng, s->wo);
     const vfloat t = vf_min(vf_set(TRC_BEND_SHARE) * iz, vf_set(TRC_BEND_HEIGHT));
-    const vmask bad = vm_and(s->active, vf_lt(v3_dot(s->ng, v3_reflect(s->wo, n)), t));
+    /* True for NaN too. */
+    const vmask bad = vm_andnot(s->active, vf_ge(v3_dot(s->ng, v3_reflect(s->wo, n)), t));
     if (!vm_any(bad))
         return n;
     const vvec3 across = v3_normalize(v3_sub(n, v3_scale(s->ng, v3_dot(n, s->ng))));
