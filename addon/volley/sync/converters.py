@@ -334,6 +334,18 @@ def _strand_values(walker):
     return intercept, length, thickness, random, is_strand
 
 
+# Where Cycles' own attributes of strands stand among them.
+_STRAND_ATTRIBUTES = {"curve_intercept": 0, "curve_length": 1, "curve_random": 3}
+
+
+def own_number(walker, name):
+    """A number that Cycles itself makes of strands or points, 0 on all others, as the attribute of a name; None for
+    other names."""
+    if name == "point_random":
+        return output(walker.emit(NodeType.POINT_INFO, ()), NodeType.POINT_INFO, "random")
+    return _strand_values(walker)[_STRAND_ATTRIBUTES[name]] if name in _STRAND_ATTRIBUTES else None
+
+
 def strand_random(walker):
     """The number of its own that a strand has."""
     return _strand_values(walker)[3]

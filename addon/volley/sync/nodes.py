@@ -20,8 +20,8 @@ from ..compat import (CURVES_NORMAL_BUMPS, HAS_CORRELATED_MICROFACETS, HAS_FAR_W
                       LEVELS_COLOR_BUMPS, RAMP_STEPS, SCALES_NORMAL_MAPS, TURNS_WINDOW_BUMPS)
 from . import standard_attributes, tangents
 from .attribute_values import excess_name, lack_name
-from .converters import (CONVERTERS, instance_value, normal_to_world, point_to_world, strand_normal, strand_radius,
-                         strand_random)
+from .converters import (CONVERTERS, instance_value, normal_to_world, own_number, point_to_world, strand_normal,
+                         strand_radius, strand_random)
 from .derived import ISLAND, POINTINESS
 from .image import image_color
 from .instance import VALUES_GENERATED, VALUES_UV
@@ -539,6 +539,9 @@ def _mesh_attribute(walker, node):
         walker.flat.needs_generated = True
         index = walker.emit(NodeType.TEXTURE_COORDINATE, (), CoordinateMode.CURVED * CURVES_NORMAL_BUMPS)
         return output(index, NodeType.TEXTURE_COORDINATE, "generated")._replace(kind='c'), alpha, excess
+    number = own_number(walker, node.attribute_name)
+    if number is not None:
+        return walker.convert(number, 'c'), alpha, excess
     if node.outputs["Alpha"].is_linked:
         alpha = _number(walker, Math.SUBTRACT, alpha, _attribute_number(walker, lack_name(name)))
     if node.outputs["Fac"].is_linked:

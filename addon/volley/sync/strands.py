@@ -9,8 +9,9 @@ import numpy as np
 from .. import abi
 from ..compat import PARTICLE_HAIR_HAS_NORMALS, VECTORS_ARE_BUFFERS
 from . import curves
-from .attribute_values import VELOCITY, colors_of, has_velocity, is_pair, linear, named_colors
+from .attribute_values import VELOCITY, colors_of, has_velocity, is_pair, linear, named_colors, widen
 from .mesh import active_color_name, wanted_uv_layers
+from .standard_attributes import UV
 
 HAIR_ATTRIBUTE = ".hair"  # (intercept, length, thickness, random) of the Hair Info node
 DIRECTION_ATTRIBUTE = ".strand"  # (x, y, z) along the strand, unit, and 1
@@ -191,16 +192,31 @@ def _root_values(mesh, modifier, strands, uv_names, color_names):
     for number, layer in wanted_uv_layers(mesh, uv_names):
         values = _at_roots(modifier.particle_system.uv_on_emitter, modifier, strands, uv_no=number)
         found.append((layer.name, values, True))
-    colors = mesh.vertex_colors
     for name in sorted(color_names):
-        source = name or active_color_name(mesh)
-        number = colors.find(source)
-        if number >= 0:
-            values = np.ones((len(strands), 4), np.float32)
-            values[:, :3] = linear(_at_roots(modifier.particle_system.mcol_on_emitter, modifier, strands,
-                                             vcol_no=number))
+        values = named_colors(name, color_names, lambda each: _root_colors(mesh, modifier, strands, each),
+                              lambda each: _root_layer(mesh, each) is not None)
+        if values is not None and all(name != known for known, _, _ in found):
             found.append((name, values, True))
     return found
+
+
+def _root_colors(mesh, modifier, strands, name):
+    """(strands, 4) of the UV map or the colour attribute of that name, None without any."""
+    system, layer = modifier.particle_system, _root_layer(mesh, name)
+    if layer is not None:
+        return widen(_at_roots(system.uv_on_emitter, modifier, strands, uv_no=layer))
+    number = mesh.vertex_colors.find(name or active_color_name(mesh))
+    if number < 0:
+        return None
+    values = np.ones((len(strands), 4), np.float32)
+    values[:, :3] = linear(_at_roots(system.mcol_on_emitter, modifier, strands, vcol_no=number))
+    return values
+
+
+def _root_layer(mesh, name):
+    """The number of the UV map that an attribute of that name is at roots, None for none."""
+    return next((number for number, layer in enumerate(mesh.uv_layers)
+                 if layer.name == name or name == UV and layer.active_render), None)
 
 
 def _object_values(data, uv_names, color_names):
@@ -208,7 +224,7 @@ def _object_values(data, uv_names, color_names):
     numbers of each strand is the default UV map, as Cycles has it."""
     found = []
     maps = [each for each in data.attributes if each.data_type == 'FLOAT2'] if uv_names else []
-    default = next((each.name for each in maps if each.domain == 'CURVE'), None)
+    default = getattr(_default_map(data), "name", None)
     for attribute in maps:
         if attribute.name == default or attribute.name in uv_names:
             values = np.empty((len(attribute.data), 2), np.float32)
@@ -221,7 +237,7 @@ def _object_values(data, uv_names, color_names):
         found.append((NORMAL_ATTRIBUTE, rows, False))
     for name in sorted(color_names):
         values = named_colors(name, color_names, lambda each: _colors(data, each),
-                              lambda each: is_pair(data.attributes, each))
+                              lambda each: each == UV or is_pair(data.attributes, each))
         if values is not None and all(name != known for known, _, _ in found):
             found.append((name, values, len(values) != len(data.points)))  # where both are as many, it is one
     return found
@@ -229,8 +245,13 @@ def _object_values(data, uv_names, color_names):
 
 def _colors(data, name):
     """Colours of an attribute of Curves or a Point Cloud, None if it is missing or of an odd type."""
-    attribute = data.attributes.get(name)
+    attribute = data.attributes.get(name) or (_default_map(data) if name == UV else None)
     return None if attribute is None else colors_of(attribute)
+
+
+def _default_map(data):
+    """The attribute that is the default UV map of Curves, None of others."""
+    return next((each for each in data.attributes if each.data_type == 'FLOAT2' and each.domain == 'CURVE'), None)
 
 
 def _at_roots(read, modifier, strands, **layer):
