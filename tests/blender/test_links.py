@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What comes through muted nodes, reroutes and groups, and out of long chains and large mixes beside Cycles, on a wall
-that shines before a grey world. Means and tiles within 1 %, beyond what noise explains. The table goes to results/links.txt of the build."""
+"""What comes through muted nodes, reroutes and groups, and out of long chains and large mixes beside Cycles, on a
+wall that shines before a grey world. Means and tiles within 1 %, beyond what noise explains. The table goes to
+results/links.txt of the build."""
 
 import blender as blender_support
 import compare
@@ -368,8 +369,8 @@ OUTPUTS = {
     "muted output": _muted_output,
     "muted output in a group": _muted_output_in_group,
 }
-# Chains of more than 120 nodes were cut, mixes of more than 16 shaders had the default material: off by up to all of the
-# picture.
+# Chains of more than 119 nodes were cut, mixes of more than 16 shaders had the default material: off by up to all of
+# the picture.
 LARGE = {
     "a thousand numbers": _long_chain,
     "three hundred mixes": _long_mixes,
