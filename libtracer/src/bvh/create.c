@@ -394,7 +394,7 @@ static bool joins_the_same(const struct create_job *job) {
             return false;
         for (uint32_t k = 0; k < then->material_count; k++)
             if (job->transparent[job->first_slot[i] + k] !=
-                trc_material_shadows_transparent(before->materials[then->materials[k]]))
+                trc_material_is_clear(before->materials[then->materials[k]]))
                 return false;
     }
     return true;
@@ -570,7 +570,7 @@ static trc_status slots_collect(struct create_job *job) {
         job->first_slot[i] = slot;
         for (uint32_t k = 0; k < s->instances[i].material_count; k++, slot++)
             job->transparent[slot] =
-                trc_material_shadows_transparent(s->materials[s->instances[i].materials[k]]);
+                trc_material_is_clear(s->materials[s->instances[i].materials[k]]);
     }
     return TRC_OK;
 }

@@ -184,6 +184,7 @@ struct trc_light_table {
     uint32_t world_visibility;    /* of its light samples */
     bool world_asks_rays;         /* its light depends on the kind of ray */
     bool world_is_shadowless;     /* nothing blocks its samples */
+    bool has_shadowless;          /* of a light that rays find, too */
 };
 
 #endif

@@ -111,9 +111,15 @@ struct trc_material {
     struct trc_material *shadow;
 };
 
-/* Whether shadow rays may pass it. */
+/* Whether rays of lobes that look for light may pass it: what is not transparent to shadows hides
+ * lights from their samples alone. */
+static inline uint8_t trc_material_is_clear(const struct trc_material *m) {
+    return (m->has & TRC_MATERIAL_CLEARS_SHADOWS) != 0;
+}
+
+/* Whether shadow rays may, too. */
 static inline uint8_t trc_material_shadows_transparent(const struct trc_material *m) {
-    return (m->has & TRC_MATERIAL_CLEARS_SHADOWS) && (m->flags & TRC_MATERIAL_TRANSPARENT_SHADOW);
+    return trc_material_is_clear(m) && (m->flags & TRC_MATERIAL_TRANSPARENT_SHADOW);
 }
 
 #endif

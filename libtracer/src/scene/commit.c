@@ -73,7 +73,7 @@ static bool transparency_is_equal(const struct trc_snapshot *a, const struct trc
         return false;
     for (uint32_t i = 0; i < a->material_count; i++) {
         const struct trc_material *x = a->materials[i], *y = b->materials[i];
-        if (x != y && trc_material_shadows_transparent(x) != trc_material_shadows_transparent(y))
+        if (x != y && trc_material_is_clear(x) != trc_material_is_clear(y))
             return false;
     }
     return true;

@@ -32,11 +32,12 @@ static uint32_t material_features(uint32_t has) {
 
 static uint32_t surface_features(const struct trc_material *m) {
     const struct trc_material *shadow = m->shadow ? m->shadow : m;
-    const uint32_t passed = trc_material_shadows_transparent(m) ? shadow->has : 0;
+    const uint32_t passed = trc_material_is_clear(m) ? shadow->has : 0;
     uint32_t features = material_features(m->has);
     if (passed & TRC_MATERIAL_READS_PIXEL)
         features |= TRC_FEATURE_SHADOW_SLOPES;
-    if (passed & TRC_MATERIAL_READS_LIGHT_PATH)
+    if ((passed & TRC_MATERIAL_READS_LIGHT_PATH) ||
+        trc_material_is_clear(m) != trc_material_shadows_transparent(m))
         features |= TRC_FEATURE_RAY_KINDS;
     return features;
 }

@@ -63,7 +63,7 @@ static bool has_shadow(const struct trc_material *m) {
             return false;
         has_more |= m->leaves[i].type != TRC_NODE_TRANSPARENT;
     }
-    return has_more && trc_material_shadows_transparent(m);
+    return has_more && trc_material_is_clear(m);
 }
 
 static trc_status build(const trc_material_desc *desc, const struct trc_compile_context *context,

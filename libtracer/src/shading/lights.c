@@ -232,6 +232,7 @@ static trc_status add_world(struct trc_light_table *table, const struct trc_snap
     }
     table->world_asks_rays = asks;
     table->world_is_shadowless = table->map && world && !world->cast_shadow;
+    table->has_shadowless |= table->world_is_shadowless;
     return TRC_OK;
 }
 
@@ -264,6 +265,8 @@ static void add_lamps(struct trc_light_table *table, const struct trc_snapshot *
         const uint32_t number = table->lamp_count++;
         table->kinds |= 1u << lamp->kind;
         table->limited |= lamp->bounce_limit != 0;
+        table->has_shadowless |=
+            (lamp->flags & (TRC_LAMP_CASTS_SHADOW | TRC_LAMP_DELTA | TRC_LAMP_MIS)) == TRC_LAMP_MIS;
         lamp->shadow_class = trc_shadow_class_of(s, options->lights[i].shadow_exclude);
         if (!options->scatters || !(lamp->visibility & RECEIVERS))
             continue;

@@ -132,21 +132,32 @@ static void world_light_by_kind(const struct arrival *a, const struct trc_surfac
         light[k] = v3_select(m, v3_mul(a->weight, v3_scale(seen[k], scale)), light[k]);
 }
 
-/* Lanes whose samples of the world stand for what rays bring in Cycles: all that mis is above
- * Cycles' part of samples, by chance, and all of worlds that it does not sample. by_ray: the
- * density of rays, of matt lobes 0. */
+/* The same of all lights: what else rays find is sampled as here. Worlds without a map are not. */
+static vfloat sampled_part_of_light(const struct trc_surface *s, const struct trc_light_sample *l,
+                                    vfloat by_ray, vmask m) {
+    const struct trc_light_table *table = s->snapshot->lights;
+    const vmask of_world = vm_and(m, vi_eq(l->light, vi_set((int32_t)table->world_light)));
+    const vfloat pl2 = vf_square(l->pdf), pb2 = vf_square(by_ray);
+    vfloat part = vf_where(vm_andnot(m, of_world), vf_divide(pl2, pl2 + pb2));
+    if (table->map && vm_any(of_world))
+        part = vf_select(of_world, sampled_part(s, l, by_ray, of_world), part);
+    return part;
+}
+
+/* Lanes whose samples stand for what rays bring in Cycles: all that mis is above Cycles' part of
+ * samples, by chance, and all of worlds that it does not sample. by_ray: the density of rays, of
+ * matt lobes 0. */
 static vmask stands_for_rays(const struct trc_surface *s, const struct trc_light_sample *l,
                              vfloat by_ray, vfloat mis, vvec3 diffuse, vmask active) {
-    const vint world = vi_set((int32_t)s->snapshot->lights->world_light);
-    const vmask m = vm_and(active, vi_eq(l->light, world));
-    if (!s->snapshot->lights->map || !vm_any(m))
+    const vmask m = vm_andnot(active, vm_or(l->delta, l->no_mis));
+    if (!vm_any(m))
         return m;
     const vfloat zero = vf_set(0.0f);
     const vmask matt =
         vm_and(vf_gt(v3_dot(s->n, l->wi), zero), vf_gt(v3_max(v3_abs(diffuse)), zero));
     by_ray = vf_max(by_ray, vf_where(matt, matt_density(s, l)));
     const vfloat chance = hash3(l->wi.x, l->wi.y, l->wi.z);
-    return vm_and(m, vf_ge(chance * mis, sampled_part(s, l, by_ray, m)));
+    return vm_and(m, vf_ge(chance * mis, sampled_part_of_light(s, l, by_ray, m)));
 }
 
 /* The kind of the rays for which the lanes' samples stand: of the lobes that bring most. */
@@ -160,8 +171,8 @@ static vuint lobe_ray(const struct trc_surface *s, const struct trc_light_sample
     return (vuint)vi_select(vf_ge(matt, vf_max(glossy, transmitted)), (vint)kinds[0], rest);
 }
 
-/* Where the world casts no shadows, or what is in its way tells shadow rays from others: what its
- * samples that stand for rays are to that. by_ray: see stands_for_rays. */
+/* Where lights cast no shadows, or what is in their way tells shadow rays from others: what samples
+ * that stand for rays are to that. by_ray: see stands_for_rays. */
 static __attribute__((noinline)) void stand_for_rays(const struct trc_surface *s,
                                                      const struct trc_light_sample *l,
                                                      vfloat by_ray, vfloat mis, vmask active,
@@ -211,7 +222,7 @@ static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
 #undef SEEN
     out->is_blocked = l->casts_shadow;
     out->kind = vu_set(TRC_VISIBLE_SHADOW);
-    if (t->snapshot->lights->world_is_shadowless || (t->snapshot->features & TRC_FEATURE_RAY_KINDS))
+    if (t->snapshot->lights->has_shadowless || (t->snapshot->features & TRC_FEATURE_RAY_KINDS))
         stand_for_rays(s, l, f.pdf * a->chance, mis, active, out);
     const vvec3 sum = v3_add(out->diffuse, v3_add(out->glossy, out->transmission));
     const vfloat size = v3_max(v3_abs(sum)); /* there are lights that take light away */

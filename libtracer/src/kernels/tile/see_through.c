@@ -32,6 +32,12 @@ static void path_load(const struct trc_shadow_store *q, vint order, struct trc_s
                 (vu_gather(q->passed, order, s->active) << TRC_DEPTH_TRANSPARENT_SHIFT);
 }
 
+/* The lanes whose rays stand for those of lobes. */
+static vmask are_of_lobes(const struct trc_tile *t, vint order, vmask active) {
+    const vuint path = vu_gather(t->shadows.path, order, active);
+    return vm_and(active, vi_eq((vint)(path & vu_set(TRC_VISIBLE_SHADOW)), vi_set(0)));
+}
+
 /* What the surfaces that the lanes' rays meet let through; 0 where a material is opaque to shadows.
  * order: of the rays. */
 static vvec3 surface_transparency(const struct trc_tile *t, const struct trc_packet *p,
@@ -51,11 +57,13 @@ static vvec3 surface_transparency(const struct trc_tile *t, const struct trc_pac
         }
         todo &= ~same;
         const struct trc_material *m = t->snapshot->materials[material];
+        struct trc_surface s = {.snapshot = t->snapshot, .active = vm_from_bits(same)};
         if (!trc_material_shadows_transparent(m))
+            s.active = are_of_lobes(t, order, s.active);
+        if (!trc_material_is_clear(m) || !vm_any(s.active))
             continue;
         if (m->shadow)
             m = m->shadow;
-        struct trc_surface s = {.snapshot = t->snapshot, .active = vm_from_bits(same)};
         struct trc_registers regs;
         struct trc_lobes lobes;
         s.instance = vi_load((const int32_t *)&hits->instance[i]);
@@ -74,7 +82,7 @@ static vvec3 surface_transparency(const struct trc_tile *t, const struct trc_pac
         if (m->instruction_count)
             trc_program_run(m, &s, &regs);
         trc_lobes_setup(m, &s, &regs, vf_set(0.0f), &lobes);
-        through = v3_select(vm_from_bits(same), trc_lobes_transparency(&lobes), through);
+        through = v3_select(s.active, trc_lobes_transparency(&lobes), through);
     }
     return through;
 }
