@@ -56,7 +56,7 @@ struct trc_mesh {
     uint8_t *smooth;       /* per triangle, or NULL: none smooth (corner normals: all) */
     uint16_t *material_index; /* per triangle, or NULL: all 0 */
     uint32_t attribute_count;
-    struct trc_attribute attributes[TRC_MAX_ATTRIBUTES];
+    const struct trc_attribute *attributes; /* attribute_count, or NULL */
     float *generated;   /* 3 * vertex_count or NULL */
     const float *rest;  /* positions before displacement, of as many keys; NULL: not displaced */
     int32_t default_uv; /* index of the attribute that is the default UV map, or -1 */

@@ -321,7 +321,7 @@ static trc_status fill_topology(struct trc_mesh_topology *t, const trc_curves_de
         spread_strands(t, desc->generated, GENERATED_FLOATS, t->generated);
         trc_clear_bad_values(t->generated, count);
     }
-    t->default_uv = -1;
+    TRC_TRY(trc_topology_expect_attributes(t, desc->attribute_count));
     for (uint32_t i = 0; i < desc->attribute_count; i++)
         TRC_TRY(add_attribute(t, &desc->attributes[i], counts->vertices, names));
     return TRC_OK;

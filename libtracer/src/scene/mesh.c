@@ -24,6 +24,7 @@ void trc_topology_release(struct trc_mesh_topology *topology) {
     for (uint32_t i = 0; i < topology->attribute_count; i++) {
         trc_free(topology->attributes[i].values);
     }
+    trc_free(topology->attributes);
     trc_free(topology->corner_begin);
     trc_free(topology->corners);
     trc_free(topology->strands);
@@ -44,6 +45,15 @@ bool trc_topology_copy(struct trc_mesh_topology *topology, const void *source, u
     }
     memcpy(copy_out, &copy, sizeof copy);
     return true;
+}
+
+trc_status trc_topology_expect_attributes(struct trc_mesh_topology *topology, uint32_t count) {
+    topology->default_uv = -1;
+    if (!count)
+        return TRC_OK;
+    topology->attributes = trc_alloc_zeroed(count, sizeof *topology->attributes);
+    topology->bytes += count * sizeof *topology->attributes;
+    return topology->attributes ? TRC_OK : no_memory();
 }
 
 static bool all_zero(const void *data, uint64_t bytes) {
@@ -95,7 +105,7 @@ static trc_status fill_topology(struct trc_mesh_topology *topology, const trc_me
     }
     if (topology->generated)
         trc_clear_bad_values(topology->generated, desc->generated_count);
-    topology->default_uv = -1;
+    TRC_TRY(trc_topology_expect_attributes(topology, desc->attribute_count));
     for (uint32_t i = 0; i < desc->attribute_count; i++) {
         TRC_TRY(copy_attribute(topology, &desc->attributes[i], names));
     }
@@ -203,7 +213,7 @@ static void share_topology(struct trc_geometry *geometry, struct trc_mesh_topolo
     mesh->strands = topology->strands;
     mesh->shape = topology->shape;
     mesh->attribute_count = topology->attribute_count;
-    memcpy(mesh->attributes, topology->attributes, sizeof mesh->attributes);
+    mesh->attributes = topology->attributes;
     mesh->default_uv = topology->default_uv;
 }
 

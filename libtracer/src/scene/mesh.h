@@ -58,7 +58,7 @@ struct trc_mesh_topology {
     uint8_t *smooth;
     uint16_t *material_index;
     float *generated;
-    struct trc_attribute attributes[TRC_MAX_ATTRIBUTES];
+    struct trc_attribute *attributes; /* attribute_count, or NULL */
     uint32_t attribute_count;
     int32_t default_uv; /* index of an attribute, or -1 */
     /* Corners (3 * triangle + corner) of each vertex, made when normals are first needed:
@@ -85,6 +85,9 @@ void trc_topology_release(struct trc_mesh_topology *topology);
 /* A copy of count elements, or NULL in *copy_out for none. False when out of memory. */
 bool trc_topology_copy(struct trc_mesh_topology *topology, const void *source, uint64_t count,
                        size_t size, void *copy_out);
+
+/* Room for so many attributes, of which there is none yet. OUT_OF_MEMORY. */
+trc_status trc_topology_expect_attributes(struct trc_mesh_topology *topology, uint32_t count);
 
 /* A mesh of that topology, whose reference it takes over, on failure too; its positions are not
  * set. OUT_OF_MEMORY. */

@@ -251,6 +251,7 @@ struct world_of_test {
     float uv[6], other[6], color[12], tangents[12];
     float normals[9];
     uint8_t smooth;
+    struct trc_attribute attributes[4];
     struct trc_mesh mesh[2];
     struct trc_mesh *meshes[2];
     struct trc_affine to_world[3], to_object[3];
@@ -288,6 +289,12 @@ static void build_meshes(struct world_of_test *w) {
         w->tangents[4 * k + 2] = -1;
     }
     w->smooth = 1;
+    const struct trc_attribute attributes[] = {
+        {.name = NAME_UV, .width = 2, .values = w->uv},
+        {.name = NAME_OTHER, .width = 2, .values = w->other},
+        {.name = NAME_COLOR, .width = 4, .values = w->color},
+        {.name = NAME_TANGENT, .width = 4, .values = w->tangents}};
+    memcpy(w->attributes, attributes, sizeof attributes);
     for (int i = 0; i < 2; i++) {
         w->mesh[i] = (struct trc_mesh){
             .key_count = i ? 2 : 1,
@@ -296,10 +303,7 @@ static void build_meshes(struct world_of_test *w) {
             .positions = w->positions[i][0],
             .indices = w->indices,
             .attribute_count = i ? 0 : 4,
-            .attributes = {{NAME_UV, 2, w->uv},
-                           {NAME_OTHER, 2, w->other},
-                           {NAME_COLOR, 4, w->color},
-                           {NAME_TANGENT, 4, w->tangents}},
+            .attributes = w->attributes,
             .default_uv = i ? -1 : 0,
             .bounds_lower = {0, 0, 0},
             .bounds_upper = {2, 4, 0},

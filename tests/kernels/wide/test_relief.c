@@ -10,6 +10,7 @@ struct plane {
     float positions[9], uv[6], color[12];
     uint32_t indices[3];
     double slope[4][3], world[9], normal[3];
+    struct trc_attribute attributes[2];
     struct trc_mesh mesh;
     struct trc_mesh *meshes[1];
     struct trc_affine to_world, to_object;
@@ -61,13 +62,15 @@ static void build_plane(struct plane *p, struct rng *r, bool is_back, float pixe
     for (uint32_t k = 0; k < 3; k++)
         p->indices[k] = k;
     memcpy(p->to_world.m, to_world, sizeof to_world);
+    p->attributes[0] = (struct trc_attribute){.name = NAME_UV, .width = 2, .values = p->uv};
+    p->attributes[1] = (struct trc_attribute){.name = NAME_COLOR, .width = 4, .values = p->color};
     p->mesh = (struct trc_mesh){.key_count = 1,
                                 .vertex_count = 3,
                                 .triangle_count = 1,
                                 .positions = p->positions,
                                 .indices = p->indices,
                                 .attribute_count = 2,
-                                .attributes = {{NAME_UV, 2, p->uv}, {NAME_COLOR, 4, p->color}},
+                                .attributes = p->attributes,
                                 .default_uv = 0};
     p->meshes[0] = &p->mesh;
     p->instance = (struct trc_instance){
