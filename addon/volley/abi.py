@@ -28,7 +28,7 @@ SUMS_END = 194
 VERSION_MAJOR = 0
 VERSION_MINOR = 1
 VERSION_PATCH = 0
-ABI_VERSION = 7
+ABI_VERSION = 8
 
 
 class StatusCode(IntEnum):
@@ -759,6 +759,11 @@ class FeatureFlags(IntFlag):
     RAY_KINDS = 33554432
 
 
+class TangentsForm(IntEnum):
+    VECTORS = 0
+    COORDINATES = 1
+
+
 class CameraDesc(Structure):
     __slots__ = ()
     _fields_ = (("struct_size", c_uint32), ("type", c_uint32), ("key_count", c_uint32),
@@ -960,6 +965,12 @@ class SceneStats(Structure):
                 ("bounds_upper", c_float * 3))
 
 
+class TangentsDesc(Structure):
+    __slots__ = ()
+    _fields_ = (("struct_size", c_uint32), ("has_seams", c_uint32), ("triangle_count", c_uint64),
+                ("positions", c_void_p), ("normals", c_void_p), ("uvs", c_void_p))
+
+
 # By their names in C.
 CONSTANTS = {"TRC_MAX_LIGHT_GROUPS": MAX_LIGHT_GROUPS, "TRC_MAX_CURVE_PIECES": MAX_CURVE_PIECES,
              "TRC_MAX_KEYS": MAX_KEYS, "TRC_MAX_ATTRIBUTES": MAX_ATTRIBUTES,
@@ -1001,7 +1012,8 @@ ENUMERATIONS = {StatusCode: "TRC_", IsaId: "TRC_ISA_", CameraType: "TRC_CAMERA_"
                 SamplerType: "TRC_SAMPLER_", AssemblyType: "TRC_ASSEMBLY_", FilterType: "TRC_FILTER_",
                 PassId: "TRC_PASS_", PassRange: "TRC_PASS_", CryptomatteKind: "TRC_CRYPTOMATTE_",
                 DenoiseType: "TRC_DENOISE_", GuidesType: "TRC_GUIDES_", PassesFlags: "TRC_PASSES_",
-                ProgressState: "TRC_PROGRESS_", SumsId: "TRC_SUMS_", FeatureFlags: "TRC_FEATURE_"}
+                ProgressState: "TRC_PROGRESS_", SumsId: "TRC_SUMS_", FeatureFlags: "TRC_FEATURE_",
+                TangentsForm: "TRC_TANGENTS_"}
 
 STRUCTURES = {"trc_camera_desc": CameraDesc, "trc_curve_attribute": CurveAttribute,
               "trc_curves_desc": CurvesDesc, "trc_corner_attribute": CornerAttribute,
@@ -1010,7 +1022,8 @@ STRUCTURES = {"trc_camera_desc": CameraDesc, "trc_curve_attribute": CurveAttribu
               "trc_node": Node, "trc_material_desc": MaterialDesc, "trc_image_desc": ImageDesc,
               "trc_rays": Rays, "trc_hits": Hits, "trc_reader_desc": ReaderDesc,
               "trc_render_desc": RenderDesc, "trc_render_progress": RenderProgress, "trc_sums": Sums,
-              "trc_part_desc": PartDesc, "trc_scene_desc": SceneDesc, "trc_scene_stats": SceneStats}
+              "trc_part_desc": PartDesc, "trc_scene_desc": SceneDesc, "trc_scene_stats": SceneStats,
+              "trc_tangents_desc": TangentsDesc}
 
 # Result and arguments.
 FUNCTIONS = {
@@ -1088,6 +1101,8 @@ FUNCTIONS = {
     "trc_scene_stats_default": (SceneStats, ()),
     "trc_scene_get_stats": (c_int32, (c_uint64, POINTER(SceneStats))),
     "trc_scene_get_warnings": (c_int32, (c_uint64, c_char_p, c_uint64, POINTER(c_uint64))),
+    "trc_tangents_desc_default": (TangentsDesc, ()),
+    "trc_tangents_find": (c_int32, (POINTER(TangentsDesc), c_uint32, c_void_p, c_uint64)),
 }
 
 # Label, inputs and outputs of the node types: kind and name of each.

@@ -232,6 +232,17 @@ def _text(value):
     return value.encode("utf-8") if value else None
 
 
+def find_tangents(positions, normals, uvs, form, has_seams=True):
+    """(triangles * 3, 3 or 4) float32 of a TRC_TANGENTS form, of triangles' corners: (triangles, 3, ...) each."""
+    positions, normals, uvs = (_array(values, np.float32) for values in (positions, normals, uvs))
+    width = 3 if form == abi.TangentsForm.VECTORS else 4
+    found = np.empty((3 * len(positions), width), np.float32)
+    desc = describe(abi.TangentsDesc, has_seams=int(has_seams), triangle_count=len(positions),
+                    positions=_address(positions), normals=_address(normals), uvs=_address(uvs))
+    _call("trc_tangents_find", ctypes.byref(desc), form, _address(found), found.size)
+    return found
+
+
 def pass_channels(pass_index):
     """Floats per pixel of a TRC_PASS, 0 for an unknown one."""
     return _require().trc_pass_channels(pass_index)

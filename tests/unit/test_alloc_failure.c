@@ -216,6 +216,18 @@ static void check_queries(struct session *s) {
     STEP(trc_query_occluded(s->scene, &rays, 0, occluded, 5));
 }
 
+static void find_tangents(void) {
+    static const float positions[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+    static const float normals[9] = {0, 0, 1, 0, 0, 1, 0, 0, 1}, uvs[6] = {0, 0, 1, 0, 0, 1};
+    trc_tangents_desc desc = trc_tangents_desc_default();
+    desc.triangle_count = 1;
+    desc.positions = positions;
+    desc.normals = normals;
+    desc.uvs = uvs;
+    float tangents[9];
+    STEP(trc_tangents_find(&desc, TRC_TANGENTS_VECTORS, tangents, 9));
+}
+
 /* Everything a host does between opening and closing a file. */
 static void run_session(uint32_t is_final) {
     struct session s = {0};
@@ -223,6 +235,7 @@ static void run_session(uint32_t is_final) {
     desc.is_final = is_final;
     STEP_OUT(s.scene, trc_scene_create(&desc, &s.scene));
     create_objects(&s);
+    find_tangents();
     set_view(&s);
     STEP(trc_scene_commit(s.scene));
     check_queries(&s);

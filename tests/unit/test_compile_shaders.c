@@ -173,7 +173,7 @@ static void test_traits_of_simple_shaders(void **state) {
     graph_clear();
     ADD(TRC_NODE_GLASS, TRC_DISTRIBUTION_GGX, white, value(-.5f), value(1.5f), n, value(0),
         value(0));
-    assert_int_equal(traits(), S | R);
+    assert_int_equal(traits(), G | R); /* the square of the roughness counts */
     graph_clear();
     ADD(TRC_NODE_REFRACTION, TRC_DISTRIBUTION_GGX, white, value(.5f), value(1.5f), n);
     assert_int_equal(traits(), G | R);
@@ -328,22 +328,32 @@ static void test_shadows_of_mixes(void **state) {
     trc_material_release(m);
 }
 
-/* Where shadow rays are blocked, need all of the material, or it is nothing but that. */
+/* Where it is opaque, or nothing but what shadow rays pass. */
 static void test_materials_without_shadows_of_their_own(void **state) {
     (void)state;
-    for (int kind = 0; kind < 3; kind++) {
+    for (int kind = 0; kind < 2; kind++) {
         graph_clear();
-        graph.flags = kind == 1 ? 0 : TRC_MATERIAL_TRANSPARENT_SHADOW;
-        if (kind == 2) {
+        graph.flags = TRC_MATERIAL_TRANSPARENT_SHADOW;
+        if (kind == 0)
+            *input_of(add_principled(0), TRC_INPUT_OF(PRINCIPLED, alpha)) = value(1.0f);
+        else
             add_transparent(color(.5f, .5f, .5f));
-        } else {
-            const int32_t principled = add_principled(0);
-            *input_of(principled, TRC_INPUT_OF(PRINCIPLED, alpha)) = value(kind ? .5f : 1.0f);
-        }
         struct trc_material *m = compiled();
         assert_null(m->shadow);
         trc_material_release(m);
     }
+}
+
+/* Of what is opaque to shadow rays, rays of lobes ask what they pass. */
+static void test_opaque_shadows(void **state) {
+    (void)state;
+    graph_clear();
+    graph.flags = 0;
+    *input_of(add_principled(0), TRC_INPUT_OF(PRINCIPLED, alpha)) = value(.5f);
+    struct trc_material *m = compiled();
+    assert_non_null(m->shadow);
+    assert_true(trc_material_is_clear(m) && !trc_material_shadows_transparent(m));
+    trc_material_release(m);
 }
 
 int main(void) {
@@ -362,6 +372,7 @@ int main(void) {
         cmocka_unit_test(test_shadows_of_principled),
         cmocka_unit_test(test_shadows_of_mixes),
         cmocka_unit_test(test_materials_without_shadows_of_their_own),
+        cmocka_unit_test(test_opaque_shadows),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

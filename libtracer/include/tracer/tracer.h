@@ -20,6 +20,7 @@
 #include "tracer/reader.h"
 #include "tracer/render.h"
 #include "tracer/scene.h"
+#include "tracer/tangents.h"
 #include "tracer/version.h"
 
 #endif

@@ -147,6 +147,10 @@ trc_part_desc trc_part_desc_default(void) {
     return (trc_part_desc){.struct_size = sizeof(trc_part_desc)};
 }
 
+trc_tangents_desc trc_tangents_desc_default(void) {
+    return (trc_tangents_desc){.struct_size = sizeof(trc_tangents_desc), .has_seams = 1};
+}
+
 trc_rays trc_rays_default(void) {
     return (trc_rays){.struct_size = sizeof(trc_rays), .visibility = TRC_VISIBLE_ALL};
 }
