@@ -79,6 +79,9 @@ CLOSES_IES_TYPE_B = bpy.app.version < (4, 0, 0)
 # Cycles of 4.0 has other microfacets: one height for masking and shadowing, glass by the micro-normal.
 HAS_CORRELATED_MICROFACETS = bpy.app.version >= (4, 0, 0)
 
+# Roughness below 0 of the Glossy and Glass nodes is 0, else its square counts; Refraction's always does.
+CLAMPS_ROUGHNESS = bpy.app.version >= (4, 0, 0)
+
 # Its camera hits no longer choose faint lobes more often than their share.
 HAS_DEFENSIVE_SAMPLING = bpy.app.version < (4, 0, 0)
 

@@ -157,6 +157,10 @@ _add("conductor", "ShaderNodeBsdfMetallic", {}, {"fresnel_type": 'PHYSICAL_CONDU
      IOR=((2.76, 2.51, 2.23), (1.1, 1.3, 0.9)), Extinction=((3.87, 3.4, 3.01), (0.3, 0.0, 0.6)))
 _add("toon", "ShaderNodeBsdfToon", {"Color": _GOLD}, Size=(0.3, 0.8), Smooth=(0.2, 0.8),
      component=('DIFFUSE', 'GLOSSY'))
+# What only links give.
+_add("glossy", "ShaderNodeBsdfGlossy", {"Color": _GOLD}, Roughness=(-0.35,))
+_add("glass", "ShaderNodeBsdfGlass", {"Color": _PALE, "IOR": 1.45}, Roughness=(-0.15,))
+_add("refraction", "ShaderNodeBsdfRefraction", {"Color": _PALE, "IOR": 1.45}, Roughness=(-0.3,))
 
 REFLECTING_HAIR = [name for name, (node, _inputs, settings) in CASES.items()
                    if node == _HAIR and settings["component"] == 'Reflection']

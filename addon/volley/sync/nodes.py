@@ -15,9 +15,9 @@ from ..abi import (AttributeMode, BlendMode, BumpMode, ClampType, CoordinateMode
                    MappingType, MathOperation as Math, ModeFlags, NodeType, NormalMapFlags, NormalMapSpace, Pigment,
                    PrincipledHairMode, RampInterpolation, SeparateMode, SpaceId, TableSize, TangentSource,
                    ToonComponent, VectorOperation as Vector)
-from ..compat import (CURVES_NORMAL_BUMPS, HAS_CORRELATED_MICROFACETS, HAS_FAR_WORLDS, HAS_FILMED_METAL,
-                      HAS_HAIR_ALBEDO, HAS_UNIT_NORMALS, HAS_WHOLE_COAT, KEEPS_DIFFUSE_ENERGY, LEAVES_BUMPS,
-                      LEVELS_COLOR_BUMPS, RAMP_STEPS, SCALES_NORMAL_MAPS, TURNS_WINDOW_BUMPS)
+from ..compat import (CLAMPS_ROUGHNESS, CURVES_NORMAL_BUMPS, HAS_CORRELATED_MICROFACETS, HAS_FAR_WORLDS,
+                      HAS_FILMED_METAL, HAS_HAIR_ALBEDO, HAS_UNIT_NORMALS, HAS_WHOLE_COAT, KEEPS_DIFFUSE_ENERGY,
+                      LEAVES_BUMPS, LEVELS_COLOR_BUMPS, RAMP_STEPS, SCALES_NORMAL_MAPS, TURNS_WINDOW_BUMPS)
 from . import standard_attributes, tangents
 from .attribute_values import excess_name, lack_name
 from .converters import (CONVERTERS, instance_value, normal_to_world, own_number, point_to_world, strand_normal,
@@ -82,6 +82,9 @@ _LAYERED_INPUTS = (
     "Thin Film Thickness", "Thin Film IOR")
 
 _SHADER = ("BSDF",)
+
+
+_CLAMPED_ROUGHNESS = {NodeType.GLOSSY, NodeType.GLASS}
 
 
 def _distribution(node):
@@ -204,6 +207,9 @@ def translate(walker, node, path):
     if mode is None:
         return _unsupported(walker, node, sockets)
     values = sockets.all_of(spec.type, spec.inputs)
+    if CLAMPS_ROUGHNESS and spec.type in _CLAMPED_ROUGHNESS:
+        roughness = spec.inputs.index("Roughness")
+        values[roughness] = _clamped(walker, values[roughness], True)
     _note_generated(walker, node, spec.type, values)
     return named_outputs(walker.emit(spec.type, values, mode), spec.type, spec.outputs, mode)
 
