@@ -382,10 +382,11 @@ def _normals_of_corners(data):
     """(triangles, 3, 3) normals that a mesh is shaded with."""
     if data.normal_kind == abi.NormalsLayout.CORNER:
         return data.normals.reshape(-1, 3, 3)
-    flat = np.repeat(tangents.face_normals(data.positions[data.indices])[:, None], 3, axis=1)
     if data.normals is None:
-        return flat
-    return np.where(data.smooth[:, None, None], data.normals[data.indices], flat)
+        return np.repeat(tangents.face_normals(data.positions[data.indices])[:, None], 3, axis=1)
+    normals, is_flat = data.normals[data.indices], ~data.smooth.astype(bool)
+    normals[is_flat] = tangents.face_normals(data.positions[data.indices[is_flat]])[:, None]
+    return normals
 
 
 def _colors(mesh, data, names, loops, group_names):
