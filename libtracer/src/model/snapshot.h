@@ -57,7 +57,7 @@ struct trc_mesh {
     uint16_t *material_index; /* per triangle, or NULL: all 0 */
     uint32_t attribute_count;
     const struct trc_attribute *attributes; /* attribute_count, or NULL */
-    float *generated;   /* 3 * vertex_count or NULL */
+    float *generated;                       /* 3 * vertex_count or NULL */
     const float *rest;  /* positions before displacement, of as many keys; NULL: not displaced */
     int32_t default_uv; /* index of the attribute that is the default UV map, or -1 */
     float bounds_lower[3],

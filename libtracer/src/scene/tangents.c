@@ -201,8 +201,9 @@ static void growing_u(const struct work *w, uint32_t corner, double out[3]) {
     subtract(position(w, corner + 2), position(w, corner), second);
     const double v1 = (double)uv(w, corner + 1)[1] - (double)uv(w, corner)[1];
     const double v2 = (double)uv(w, corner + 2)[1] - (double)uv(w, corner)[1];
+    const int8_t sign = w->signs[corner / 3];
     for (int i = 0; i < 3; i++)
-        out[i] = (first[i] * v2 - second[i] * v1) * w->signs[corner / 3];
+        out[i] = (first[i] * v2 - second[i] * v1) * sign;
 }
 
 /* The angle at a corner, seen along its normal. */
