@@ -100,7 +100,7 @@ HAS_BLENDED_FEATURES = bpy.app.version >= (5, 0, 0)
 # Colours of rough glass's refraction are what micro-normals do not reflect on average; seen in 5.2, not in 4.3.
 HAS_MEAN_REFRACTION = bpy.app.version >= (5, 0, 0)
 
-# Paths pass one transparent surface less than the limit says, shadow rays as many; seen in 5.2, not in 3.4.
+# Paths pass one transparent surface less than the limit says, shadow rays as many; seen in 5.2, not in 4.3.
 COUNTS_LAST_PASSED = bpy.app.version >= (5, 0, 0)
 
 # The vector pass has the motion of the background; seen in 5.2, not in 4.3.

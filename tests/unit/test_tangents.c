@@ -33,6 +33,15 @@ static void set_corner(struct soup *s, uint32_t corner, const float position[3],
     memcpy(s->uvs + 2 * corner, uv, 2 * sizeof(float));
 }
 
+/* The tangents in both forms; how many corners there are. */
+static uint32_t find_both(const struct soup *s, float *vectors, float *told) {
+    const trc_tangents_desc desc = desc_of(s);
+    const uint32_t corners = 3 * s->triangles;
+    assert_int_equal(trc_tangents_find(&desc, TRC_TANGENTS_VECTORS, vectors, 3 * corners), TRC_OK);
+    assert_int_equal(trc_tangents_find(&desc, TRC_TANGENTS_COORDINATES, told, 4 * corners), TRC_OK);
+    return corners;
+}
+
 /* A square of so many pieces to a side in the plane z = 0, U turned by an angle, mirrored or not.
  */
 static void lay_plane(struct soup *s, uint32_t side, double angle, bool is_mirrored) {
@@ -56,13 +65,8 @@ static void planes(void **state) {
     for (int kind = 0; kind < 8; kind++) {
         const double angle = 0.3 + 0.7 * kind;
         lay_plane(&s, 3, angle, kind & 1);
-        const trc_tangents_desc desc = desc_of(&s);
-        const uint64_t corners = 3 * (uint64_t)s.triangles;
-        assert_int_equal(trc_tangents_find(&desc, TRC_TANGENTS_VECTORS, vectors, 3 * corners),
-                         TRC_OK);
-        assert_int_equal(trc_tangents_find(&desc, TRC_TANGENTS_COORDINATES, told, 4 * corners),
-                         TRC_OK);
-        for (uint64_t i = 0; i < corners; i++) {
+        const uint32_t corners = find_both(&s, vectors, told);
+        for (uint32_t i = 0; i < corners; i++) {
             assert_float_equal(vectors[3 * i], cos(angle), 1e-6);
             assert_float_equal(vectors[3 * i + 1], sin(angle), 1e-6);
             assert_float_equal(vectors[3 * i + 2], 0.0, 1e-6);
@@ -230,12 +234,7 @@ static void coordinates(void **state) {
     double worst = 0.0;
     for (int trial = 0; trial < 500; trial++) {
         scatter(&s, &r);
-        const trc_tangents_desc desc = desc_of(&s);
-        const uint64_t corners = 3 * (uint64_t)s.triangles;
-        assert_int_equal(trc_tangents_find(&desc, TRC_TANGENTS_VECTORS, vectors, 3 * corners),
-                         TRC_OK);
-        assert_int_equal(trc_tangents_find(&desc, TRC_TANGENTS_COORDINATES, told, 4 * corners),
-                         TRC_OK);
+        const uint32_t corners = find_both(&s, vectors, told);
         for (uint32_t corner = 0; corner < corners; corner++) {
             const uint32_t first = corner - corner % 3;
             double a[3], b[3], v[3], flat[3];

@@ -32,7 +32,7 @@ enum trc_tangents_form {
  * Surfaces Revisited", 2008): corners of one place, normal, UV and handedness whose triangles are
  * joined by edges share one, the mean of their triangles' directions of growing U by the angles
  * there; (1, 0, 0) where U grows nowhere. tangents_out: float_count floats, of the form. At once,
- * on the calling thread, from any thread; 50 bytes for each corner while it lasts, some .2
+ * on the calling thread, from any thread; 50 bytes for each corner while it lasts, some .1
  * microseconds. INVALID_ARGUMENT, TOO_LARGE or OUT_OF_MEMORY. */
 TRC_API trc_status trc_tangents_find(const trc_tangents_desc *desc, uint32_t form,
                                      float *tangents_out, uint64_t float_count);
