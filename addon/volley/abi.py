@@ -28,7 +28,7 @@ SUMS_END = 194
 VERSION_MAJOR = 0
 VERSION_MINOR = 1
 VERSION_PATCH = 0
-ABI_VERSION = 8
+ABI_VERSION = 9
 
 
 class StatusCode(IntEnum):
@@ -1065,6 +1065,7 @@ FUNCTIONS = {
     "trc_material_destroy": (c_int32, (c_uint64, c_uint64)),
     "trc_image_desc_default": (ImageDesc, ()),
     "trc_image_create": (c_int32, (c_uint64, POINTER(ImageDesc), POINTER(c_uint64))),
+    "trc_image_update": (c_int32, (c_uint64, c_uint64, POINTER(ImageDesc))),
     "trc_image_expect": (c_int32, (c_uint64, POINTER(ImageDesc))),
     "trc_image_destroy": (c_int32, (c_uint64, c_uint64)),
     "trc_rays_default": (Rays, ()),

@@ -472,14 +472,19 @@ class Scene:
         return desc, (keep, structs, inputs)
 
     def create_image(self, **values):
-        """An image from a file or from pixels (height, width, 4), float32 or uint8, bottom row first; other
-        keywords as :meth:`_image_desc`."""
+        """An image from a file or from pixels (height, width, 4), float32 or uint8, bottom row first; without either
+        it is magenta until :meth:`update_image`. Other keywords as :meth:`_image_desc`."""
         desc, keep = self._image_desc(**values)
         return self._create("trc_image_create", desc)
 
+    def update_image(self, image, **values):
+        """Other contents of an image; keywords as of :meth:`create_image`."""
+        desc, keep = self._image_desc(**values)
+        self._edit("trc_image_update", image, ctypes.byref(desc))
+
     def expect_image(self, **values):
-        """Read the file of an image ahead, beside others: :meth:`create_image` with equal keywords, before
-        the next commit, takes it from there."""
+        """Read the file of an image ahead, beside others: :meth:`create_image` or :meth:`update_image` with equal
+        keywords, before the next commit, takes it from there."""
         desc, keep = self._image_desc(**values)
         _call("trc_image_expect", self._handle, ctypes.byref(desc))
 

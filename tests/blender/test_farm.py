@@ -388,12 +388,12 @@ def inside_files(folder):
     scene, tree = bpy.context.scene, bpy.data.objects["Cube"].data.materials[0].node_tree
     scene.render.use_motion_blur = False
     scene.volley.samples = 1
-    given, create = [], native.Scene.create_image
+    given, update = [], native.Scene.update_image
 
-    def note(self, **values):
+    def note(self, image, **values):
         given.append(values.get("path"))
-        return create(self, **values)
-    native.Scene.create_image = note
+        update(self, image, **values)
+    native.Scene.update_image = note
     for name in ("plain", "t.1001", "t.1012", *(f"s_{number:03d}" for number in range(3, 13))):
         _save_image(f"{folder}/{name}.tga", (0.5, 0.25, 0.125, 1.0), (1024, 1024) if name == "plain" else (4, 4))
     found, changed = {}, set()

@@ -169,6 +169,57 @@ def test_files_that_are_written_again(blender):
     assert np.abs(before[1] - after[1]).max() > 0.1
 
 
+def inside_read_beside_meshes():
+    """The calls of a render that make meshes, and that ask for a file and wait for it."""
+    import scenes
+    import volley.native
+    _stage(lambda: _noise_file(64))
+    calls = []
+    names = ("expect_image", "create_mesh", "update_image", "commit")
+
+    def noted(name):
+        method = getattr(volley.native.Scene, name)
+
+        def call(*arguments, **values):
+            calls.append(name)
+            return method(*arguments, **values)
+        return call
+    for name in names:
+        setattr(volley.native.Scene, name, noted(name))
+    return calls, scenes.render()
+
+
+def test_files_are_read_while_meshes_are(blender):
+    calls, picture = blender.run(inside_read_beside_meshes)
+    assert calls == ["expect_image", "create_mesh", "update_image", "commit"]
+    assert picture[..., :3].std() > 0.05
+
+
+def inside_lost():
+    """Volley's pictures of a file of text, which becomes an image, and again text, with persistent data."""
+    import bpy
+    import scenes
+    _stage(lambda: _noise_file(64))
+    path = bpy.data.images[0].filepath
+    with open(path, "rb") as file:
+        noise = file.read()
+    bpy.context.scene.render.use_persistent_data = True
+    pictures = []
+    for content in (b"no image", noise, b"no image"):
+        with open(path, "wb") as file:
+            file.write(content)
+        bpy.data.images[0].reload()
+        pictures.append(scenes.render()[..., :3])
+    return pictures
+
+
+def test_files_that_cannot_be_read(blender):
+    first, noise, last = blender.run(inside_lost)
+    assert np.abs(first - (1.0, 0.0, 1.0)).max() < 1e-6 and (last == first).all()
+    assert noise.std() > 0.05
+    assert "magenta is used" in blender.output
+
+
 def inside_memory():
     """Noise of 4 MiB and its levels within 2 MiB, and at half its side by Simplify."""
     import bpy

@@ -5,8 +5,9 @@
 /* Texels across a pixel; the image is a square on a strip, narrower texels above each other. */
 enum { TEXELS = 8, WIDTH = LEVEL_WIDTH * TEXELS, HEIGHT = WIDTH };
 
-/* Every other pixel's texels are white, over the whole view. */
-static trc_scene striped(void) {
+/* Every other pixel's texels are white, over the whole view. is_late: the image gets its contents
+ * when the material is there. */
+static trc_scene striped(bool is_late) {
     static uint8_t pixels[4 * WIDTH * HEIGHT];
     const trc_scene scene = fixture_level_view();
     for (uint32_t i = 0; i < WIDTH * HEIGHT; i++)
@@ -20,7 +21,8 @@ static trc_scene striped(void) {
     desc.is_mip_mapped = 1;
     desc.pixels = pixels;
     desc.pixel_bytes = sizeof pixels;
-    assert_ok(trc_image_create(scene, &desc, &image));
+    const trc_image_desc none = {.struct_size = sizeof none, .is_mip_mapped = 1};
+    assert_ok(trc_image_create(scene, is_late ? &none : &desc, &image));
     struct node_list list = {0};
     const uint32_t texture = NODE_ADD(&list, TRC_NODE_IMAGE, TRC_IMAGE_LINEAR | TRC_IMAGE_EXTEND,
                                       node_standard(), node_number(0.0f));
@@ -42,6 +44,7 @@ static trc_scene striped(void) {
     mesh.attributes = &map;
     mesh.attribute_count = 1;
     fixture_mesh(scene, &mesh, level_material(scene, &list, surface, 0), 0);
+    assert_ok(trc_image_update(scene, image, &desc));
     assert_ok(trc_scene_commit(scene));
     return scene;
 }
@@ -62,9 +65,8 @@ static double contrast(trc_scene scene, uint32_t samples) {
 /* With one sample a pixel shows the level whose texels are as wide as it, blurred over two of them:
  * a half of the contrast. With many it shows the image, whose ramp of one texel between neighbours
  * takes a quarter of a texel from each end of a stripe. */
-static void samples_choose_the_level(void **state) {
-    (void)state;
-    const trc_scene scene = striped();
+static void check_levels(bool is_late) {
+    const trc_scene scene = striped(is_late);
     double found[2];
     for (int k = 0; k < 2; k++)
         found[k] = contrast(scene, k ? 1024 : 1);
@@ -73,6 +75,12 @@ static void samples_choose_the_level(void **state) {
     assert_true(fabs(found[0] - 0.5) < 0.1);
     assert_true(fabs(found[1] - (1.0 - 2.0 / (4.0 * TEXELS))) < 0.01);
     assert_ok(trc_scene_destroy(scene));
+}
+
+static void samples_choose_the_level(void **state) {
+    (void)state;
+    check_levels(false);
+    check_levels(true);
 }
 
 int main(void) {

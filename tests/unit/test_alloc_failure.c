@@ -119,13 +119,14 @@ static void create_textured(struct session *s) {
 
 static void create_objects(struct session *s) {
     const trc_mesh_desc mesh = rich_mesh();
-    const trc_image_desc image = default_image_desc();
+    const trc_image_desc image = default_image_desc(), none = {.struct_size = sizeof none};
     const trc_light_desc light = default_light_desc();
     struct default_material glow;
     default_material_init(&glow, TRC_NODE_EMISSION);
     STEP_OUT(s->mesh, trc_mesh_create(s->scene, &mesh, &s->mesh));
-    STEP_OUT(s->image, trc_image_create(s->scene, &image, &s->image));
+    STEP_OUT(s->image, trc_image_create(s->scene, &none, &s->image));
     create_textured(s);
+    STEP(trc_image_update(s->scene, s->image, &image));
     STEP_OUT(s->glow, trc_material_create(s->scene, &glow.desc, &s->glow));
     const trc_id materials[2] = {s->material, s->glow};
     trc_instance_desc instance = default_instance_desc(s->mesh);

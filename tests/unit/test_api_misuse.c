@@ -101,6 +101,7 @@ static void bad_ids(void **state) {
     const trc_scene_desc scene_desc = default_scene_desc();
     const trc_mesh_desc mesh = default_mesh_desc();
     const trc_light_desc light = default_light_desc();
+    const trc_image_desc image = default_image_desc();
     struct default_material material;
     default_material_init(&material, TRC_NODE_DIFFUSE);
     trc_scene other = 0;
@@ -121,6 +122,7 @@ static void bad_ids(void **state) {
         REFUSED(HANDLE, trc_instance_destroy(scene, bad[i]));
         REFUSED(HANDLE, trc_material_update(scene, bad[i], &material.desc));
         REFUSED(HANDLE, trc_material_destroy(scene, bad[i]));
+        REFUSED(HANDLE, trc_image_update(scene, bad[i], &image));
         REFUSED(HANDLE, trc_image_destroy(scene, bad[i]));
         REFUSED(HANDLE, trc_light_update(scene, bad[i], &light));
         REFUSED(HANDLE, trc_light_destroy(scene, bad[i]));
@@ -153,7 +155,7 @@ static void bad_ids(void **state) {
 
 static void wrong_struct_sizes(void **state) {
     (void)state;
-    trc_id id = UNTOUCHED, mesh = 0, instance = 0, light = 0, material = 0;
+    trc_id id = UNTOUCHED, mesh = 0, instance = 0, light = 0, material = 0, of_image = 0;
     trc_scene_desc scene_desc = default_scene_desc();
     trc_mesh_desc mesh_desc = default_mesh_desc();
     trc_camera_desc camera = default_camera_desc();
@@ -170,6 +172,7 @@ static void wrong_struct_sizes(void **state) {
     assert_int_equal(trc_instance_create(scene, &instance_desc, &instance), TRC_OK);
     assert_int_equal(trc_light_create(scene, &light_desc, &light), TRC_OK);
     assert_int_equal(trc_material_create(scene, &m.desc, &material), TRC_OK);
+    assert_int_equal(trc_image_create(scene, &image, &of_image), TRC_OK);
     trc_render render = 0;
     assert_int_equal(trc_render_start(scene, &render_desc, &render), TRC_OK);
 #define CALL(d) trc_scene_create(d, &id)
@@ -197,6 +200,9 @@ static void wrong_struct_sizes(void **state) {
     REFUSE_DESC(m.desc, CALL);
 #undef CALL
 #define CALL(d) trc_image_create(scene, d, &id)
+    REFUSE_DESC(image, CALL);
+#undef CALL
+#define CALL(d) trc_image_update(scene, of_image, d)
     REFUSE_DESC(image, CALL);
 #undef CALL
 #define CALL(d) trc_scene_set_camera(scene, d)
@@ -713,12 +719,18 @@ static void images(void **state) {
     REFUSE_IMAGE(ARGUMENT, desc.pixel_bytes--);
     REFUSE_IMAGE(ARGUMENT, desc.pixels = MISALIGNED(float));
     REFUSE_IMAGE(ARGUMENT, desc.path = "both");
+#undef REFUSE_IMAGE
     trc_image_desc desc = {.struct_size = sizeof desc, .path = "/nowhere/nothing.png"};
     assert_int_equal(trc_image_create(scene, &desc, &id), TRC_ERROR_IMAGE);
     assert_true(id == UNTOUCHED);
-    desc = default_image_desc();
-    assert_int_equal(trc_image_create(scene, &desc, &id), TRC_OK);
+    const trc_image_desc good = default_image_desc();
+    assert_int_equal(trc_image_create(scene, &good, &id), TRC_OK);
+    assert_int_equal(trc_image_update(scene, id, &desc), TRC_ERROR_IMAGE);
+    desc.alpha_mode = 4;
+    REFUSED(ARGUMENT, trc_image_update(scene, id, &desc));
+    assert_int_equal(trc_image_update(scene, id, &good), TRC_OK);
     assert_int_equal(trc_image_destroy(scene, id), TRC_OK);
+    REFUSED(HANDLE, trc_image_update(scene, id, &good));
     REFUSED(HANDLE, trc_image_destroy(scene, id));
 }
 

@@ -23,21 +23,23 @@ static trc_material_desc node_material(struct node_list *list, uint32_t type, fl
     return desc;
 }
 
-/* An image of one bright texel in the upper half. */
-static trc_id add_sky(trc_scene scene, uint32_t bright) {
+/* An image of one bright texel in the upper half; until the next call. */
+static trc_image_desc sky_desc(uint32_t bright) {
     enum { WIDTH = 16, HEIGHT = 8 };
     static float pixels[4 * WIDTH * HEIGHT];
     for (uint32_t i = 0; i < WIDTH * HEIGHT; i++)
         for (uint32_t c = 0; c < 4; c++)
             pixels[4 * i + c] = c == 3 || i != bright ? (c == 3 ? 1.0f : 0.01f) : 20.0f;
     trc_image_desc desc = default_image_desc();
-    trc_id image = 0;
     desc.width = WIDTH;
     desc.height = HEIGHT;
     desc.pixels = pixels;
     desc.pixel_bytes = sizeof pixels;
-    assert_ok(trc_image_create(scene, &desc, &image));
-    return image;
+    return desc;
+}
+
+static trc_image_desc no_contents(void) {
+    return (trc_image_desc){.struct_size = sizeof(trc_image_desc)};
 }
 
 static trc_id add_sky_material(trc_scene scene, trc_id image) {
@@ -49,8 +51,8 @@ static trc_id add_sky_material(trc_scene scene, trc_id image) {
     return level_material(scene, &list, surface, 0);
 }
 
-/* roof, value: of its material; bright: the sky's texel. */
-static struct edited edited_make(uint32_t roof, float value, uint32_t bright) {
+/* roof, value: of its material. */
+static struct edited edited_under(uint32_t roof, float value, trc_image_desc sky) {
     struct edited e = {.scene = fixture_level_view()};
     struct node_list list;
     const trc_material_desc roof_desc = node_material(&list, roof, value);
@@ -65,13 +67,18 @@ static struct edited edited_make(uint32_t roof, float value, uint32_t bright) {
     sun.type = TRC_LIGHT_SUN;
     sun.strength = (float)PI;
     assert_ok(trc_light_create(e.scene, &sun, &id));
-    e.image = add_sky(e.scene, bright);
+    assert_ok(trc_image_create(e.scene, &sky, &e.image));
     e.world = add_sky_material(e.scene, e.image);
     trc_world_desc world = default_world_desc(e.world);
     world.use_sampling = 1;
     world.map_resolution = 32;
     assert_ok(trc_scene_set_world(e.scene, &world));
     return e;
+}
+
+/* bright: the sky's texel. */
+static struct edited edited_make(uint32_t roof, float value, uint32_t bright) {
+    return edited_under(roof, value, sky_desc(bright));
 }
 
 static void draw(trc_scene scene, float pixels[4 * LEVEL_PIXELS]) {
@@ -149,6 +156,41 @@ static void images_of_the_world_change(void **state) {
     expect_same(&e, &fresh, before);
 }
 
+/* Without contents an image is magenta, as one that is gone; it gets them before or after the first
+ * commit, others, and loses them. */
+static void images_get_contents(void **state) {
+    (void)state;
+    static float before[4 * LEVEL_PIXELS];
+    const trc_image_desc none = no_contents();
+    const struct edited late = edited_under(TRC_NODE_DIFFUSE, 0.5f, none);
+    const struct edited gone = edited_make(TRC_NODE_DIFFUSE, 0.5f, 40);
+    assert_ok(trc_image_destroy(gone.scene, gone.image));
+    memset(before, 0, sizeof before);
+    expect_same(&late, &gone, before);
+    for (uint32_t k = 0; k < 3; k++) {
+        const uint32_t wanted = k == 2 ? 70 : 40;
+        const struct edited e = edited_under(TRC_NODE_DIFFUSE, 0.5f, none);
+        if (k == 0)
+            memset(before, 0, sizeof before);
+        else
+            draw(e.scene, before);
+        trc_image_desc sky = sky_desc(40);
+        assert_ok(trc_image_update(e.scene, e.image, &sky));
+        if (k == 2) {
+            draw(e.scene, before);
+            sky = sky_desc(wanted);
+            assert_ok(trc_image_update(e.scene, e.image, &sky));
+        }
+        const struct edited fresh = edited_make(TRC_NODE_DIFFUSE, 0.5f, wanted);
+        expect_same(&e, &fresh, before);
+    }
+    const struct edited emptied = edited_make(TRC_NODE_DIFFUSE, 0.5f, 40);
+    const struct edited empty = edited_under(TRC_NODE_DIFFUSE, 0.5f, none);
+    draw(emptied.scene, before);
+    assert_ok(trc_image_update(emptied.scene, emptied.image, &none));
+    expect_same(&emptied, &empty, before);
+}
+
 /* Several at once, as one by one; all or none. */
 static void instances_move(void **state) {
     (void)state;
@@ -189,6 +231,7 @@ int main(void) {
         cmocka_unit_test(materials_change),
         cmocka_unit_test(trees_of_transparent_meshes_stay),
         cmocka_unit_test(images_of_the_world_change),
+        cmocka_unit_test(images_get_contents),
         cmocka_unit_test(instances_move),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

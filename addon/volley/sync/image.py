@@ -4,7 +4,8 @@
 Plain and packed files are read by the library itself. Generated and painted images, frames of movies, and
 files in formats that the library does not know, or any where it has no OpenImageIO, come from Blender's
 pixels. An image that is missing, damaged, too large or whatever else is 0, which renders magenta, with one
-warning; it never costs the render.
+warning; it never costs the render. Files are read while meshes are: their images have no contents before
+the end of a sync.
 Colours are converted to scene-linear ones by the library, with Blender's OpenColorIO configuration.
 """
 
@@ -13,6 +14,7 @@ import os
 import re
 import tempfile
 import zlib
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -26,10 +28,22 @@ _ALPHA_MODES = {'STRAIGHT': abi.AlphaMode.STRAIGHT, 'PREMUL': abi.AlphaMode.PREM
                 'CHANNEL_PACKED': abi.AlphaMode.CHANNEL_PACKED, 'NONE': abi.AlphaMode.NONE}
 _ANIMATED_SOURCES = {'SEQUENCE', 'MOVIE'}
 _FILE_SOURCES = {'FILE', 'SEQUENCE', 'TILED'}
-_IMAGE_NODES = {'TEX_IMAGE', 'TEX_ENVIRONMENT'}
 _MAX_NUMBERS = (1 << 31) - 1  # of pixels that Blender's Python can count
 
 _FIRST_TILE, _TILES_PER_ROW = 1001, 10  # UDIM
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """What the library's image of that id is to show; path: of a file, "" for what is in the .blend; tile: the
+    number of one of a tiled image that is packed."""
+
+    image: bpy.types.Image
+    path: str
+    is_mip_mapped: bool
+    tile: int | None
+    id: int
+    name: str
 
 
 class Images:
@@ -38,6 +52,7 @@ class Images:
     def __init__(self, scene, warnings):
         self._scene, self._warnings = scene, warnings
         self._entries = {}  # key -> (signature, id)
+        self._empty = {}    # key -> _Wanted, of files that are being read
         self._seen = set()
         self._look_again = True
         self._limit = 0
@@ -61,25 +76,6 @@ class Images:
         """Keep images for whoever has asked for them in a former sync and has not changed."""
         self._seen |= keys
 
-    def expect(self, trees):
-        """Have the library read the files of the image nodes of trees, side by side, before they are asked
-        for: nodes that lead nowhere are few."""
-        for node in _image_nodes(trees):
-            image = node.image
-            if image.source == 'TILED' and node.type == 'TEX_IMAGE' and node.projection == 'FLAT':
-                for _, path in _tile_paths(image):
-                    self._expect_path(image, path, False)
-            else:
-                self._expect_path(image, self._path_of(node), _is_mip_mapped(node))
-
-    def _path_of(self, node):
-        return _file_path(node.image, frame_of(node.image_user, self._frame))
-
-    def _expect_path(self, image, path, is_mip_mapped):
-        known = self._entries.get((image.name_full, path, is_mip_mapped))
-        if path and not (known and known[0] == self._signature(image, path)):
-            self._scene.expect_image(**self._file_values(image, path, is_mip_mapped), **_encoding(image))
-
     def id_of(self, node):
         """The library's image of an image or environment texture node, 0 for a missing one."""
         image = node.image
@@ -87,7 +83,8 @@ class Images:
             return 0
         if image.source == 'MOVIE':
             return self._id_of_path(image, "", _is_mip_mapped(node), frame_of(node.image_user, self._frame))
-        return self._id_of_path(image, self._path_of(node), _is_mip_mapped(node))
+        path = _file_path(image, frame_of(node.image_user, self._frame))
+        return self._id_of_path(image, path, _is_mip_mapped(node))
 
     def tiles_of(self, node):
         """The tiles of a tiled image: (column, row, library's image) of each."""
@@ -120,18 +117,25 @@ class Images:
         signature = self._signature(image, path, tile)
         if known and known[0] == signature:
             return known[1]
-        self._entries[key] = (signature, self._create(image, path, is_mip_mapped, tile))
-        if known and known[1]:
+        created = self._scene.create_image(is_mip_mapped=is_mip_mapped)
+        self._entries[key] = (signature, created)
+        wanted = _Wanted(image, path, is_mip_mapped, tile, created, image.name)
+        if path:
+            self._scene.expect_image(**self._file_values(wanted, path), **_encoding(image))
+            self._empty[key] = wanted
+        else:
+            self._fill(wanted)
+        if known:
             self._scene.destroy_image(known[1])
-        return self._entries[key][1]
+        return created
 
     def _signature(self, image, path, tile=None):
         return _signature(image, path, tile) + (self._limit, working_space())
 
-    def _file_values(self, image, path, is_mip_mapped):
-        """A file as keywords of create_image, but for its colour space."""
-        return {"path": path, "alpha_mode": _alpha_mode(image), "is_alpha_literal": HAS_LITERAL_ALPHA,
-                "max_side": self._limit, "is_mip_mapped": is_mip_mapped}
+    def _file_values(self, wanted, path):
+        """A file as keywords of update_image, but for its colour space."""
+        return {"path": path, "alpha_mode": _alpha_mode(wanted.image), "is_alpha_literal": HAS_LITERAL_ALPHA,
+                "max_side": self._limit, "is_mip_mapped": wanted.is_mip_mapped}
 
     def id_of_table(self, name, make, *arguments):
         """The library's image of a table (height, width, 3) of scene-linear colours, make(*arguments)."""
@@ -163,73 +167,87 @@ class Images:
         return self._entries[key][1]
 
     def end(self):
-        """Free what nothing asked for since begin."""
+        """Free what nothing asked for since begin, and wait for the files of the others."""
         for key in [key for key in self._entries if key not in self._seen]:
             _, image_id = self._entries.pop(key)
+            self._empty.pop(key, None)
             if image_id:
                 self._scene.destroy_image(image_id)
+        while self._empty:
+            self._fill(self._empty.pop(next(iter(self._empty))))
 
-    def _create(self, image, path, is_mip_mapped, tile):
+    def _fill(self, wanted):
+        """Give an image its contents; it stays magenta, with a warning, where that cannot be."""
         try:
-            if path:
-                return self._from_file(image, path, is_mip_mapped)
-            packed = _packed_file(image, tile)
-            is_alike = packed and _is_read_alike(image, packed.data)
-            if not packed or (tile is None and not is_alike):
-                return self._from_pixels(image, is_mip_mapped)
-            with tempfile.TemporaryDirectory() as folder:
-                name = os.path.basename(image.filepath if tile is None else tile_path(image, tile))
-                path = os.path.join(folder, name or image.name)
-                with open(path, "wb") as file:
-                    file.write(packed.data)
-                return (self._from_file if is_alike else self._as_blender_reads)(image, path, is_mip_mapped)
-        except (native.TracerError, OSError, RuntimeError, MemoryError) as error:  # RuntimeError: of Blender
-            self._warnings.add(f"Image '{image.name}': {error or 'no memory'}; magenta is used")
-            return 0
+            if wanted.path:
+                self._fill_from_file(wanted, wanted.path)
+            else:
+                self._fill_from_blend(wanted)
+        # RuntimeError: of Blender, ReferenceError: of an image that is gone since
+        except (native.TracerError, OSError, RuntimeError, MemoryError, ReferenceError) as error:
+            self._warnings.add(f"Image '{wanted.name}': {error or 'no memory'}; magenta is used")
 
-    def _from_file(self, image, path, is_mip_mapped):
-        """The image as the library reads it, or as Blender does where the library cannot."""
+    def _fill_from_blend(self, wanted):
+        image, tile = wanted.image, wanted.tile
+        packed = _packed_file(image, tile)
+        is_alike = packed and _is_read_alike(image, packed.data)
+        if not packed or (tile is None and not is_alike):
+            self._fill_from_pixels(wanted, image)
+            return
+        with tempfile.TemporaryDirectory() as folder:
+            name = os.path.basename(image.filepath if tile is None else tile_path(image, tile))
+            path = os.path.join(folder, name or image.name)
+            with open(path, "wb") as file:
+                file.write(packed.data)
+            (self._fill_from_file if is_alike else self._fill_as_blender_reads)(wanted, path)
+
+    def _fill_from_file(self, wanted, path):
+        """As the library reads it, or as Blender does where the library cannot."""
         try:
-            return self._in_its_space(image, self._file_values(image, path, is_mip_mapped))
+            self._fill_in_its_space(wanted, self._file_values(wanted, path))
+            return
         except native.TracerError as error:
             if error.status == abi.StatusCode.ERROR_UNSUPPORTED:
                 self._warnings.add(f"{error}; Blender reads them")
             elif error.status != abi.StatusCode.ERROR_FORMAT:
                 raise
-        return self._as_blender_reads(image, path, is_mip_mapped)
+        self._fill_as_blender_reads(wanted, path)
 
-    def _as_blender_reads(self, image, path, is_mip_mapped):
+    def _fill_as_blender_reads(self, wanted, path):
         with bpy.data.temp_data() as data:  # the image itself shows any one of its frames or tiles
-            return self._from_pixels(_loaded(data, image, path), is_mip_mapped)
+            self._fill_from_pixels(wanted, _loaded(data, wanted.image, path))
 
-    def _from_pixels(self, image, is_mip_mapped):
+    def _fill_from_pixels(self, wanted, image):
         pixels = read_pixels(image)
         if pixels is None:
             self._warnings.add(f"Image '{image.name}': cannot be read, magenta is used")
-            return 0
+            return
         if image.is_float and _is_rec709(image):
             pixels = spaces.rec709_pixels(pixels)
         values = {"pixels": pixels, "alpha_mode": _pixel_alpha_mode(image), "max_side": self._limit,
-                  "is_mip_mapped": is_mip_mapped}
-        return self._scene.create_image(**values) if image.is_float else self._in_its_space(image, values)
+                  "is_mip_mapped": wanted.is_mip_mapped}
+        if image.is_float:
+            self._scene.update_image(wanted.id, **values)
+        else:
+            self._fill_in_its_space(wanted, values)
 
-    def _in_its_space(self, image, values):
-        """The image with its colours converted, as sRGB where that cannot be."""
-        encoding = _encoding(image)
+    def _fill_in_its_space(self, wanted, values):
+        """With colours converted, as sRGB where that cannot be."""
+        encoding = _encoding(wanted.image)
         try:
-            return self._scene.create_image(**values, **encoding)
+            self._scene.update_image(wanted.id, **values, **encoding)
+            return
         except native.TracerError as error:
             cannot = error.status in (abi.StatusCode.ERROR_IMAGE, abi.StatusCode.ERROR_UNSUPPORTED)
             if not cannot or "color_space" not in encoding:
                 raise
             failure = error
         try:
-            created = self._scene.create_image(**values, is_srgb=True)
+            self._scene.update_image(wanted.id, **values, is_srgb=True)
         except native.TracerError:
             raise failure from None  # of the file itself
-        self._warnings.add(f"Image '{image.name}': colour space {image.colorspace_settings.name} "
-                           "cannot be converted, sRGB is used")
-        return created
+        self._warnings.add(f"Image '{wanted.image.name}': colour space "
+                           f"{wanted.image.colorspace_settings.name} cannot be converted, sRGB is used")
 
 
 def size_limit(scene, is_final):
@@ -388,22 +406,6 @@ def _readable_tile_path(image, number):
 def _tile_paths(image):
     """(number, path as of _readable_tile_path) of each tile of an image."""
     return [(tile.number, _readable_tile_path(image, tile.number)) for tile in image.tiles]
-
-
-def _image_nodes(trees):
-    """The nodes of trees and of the groups in them that show an image."""
-    seen, waiting = set(), list(trees)
-    while waiting:
-        tree = waiting.pop()
-        if tree is None or tree.as_pointer() in seen:
-            continue
-        seen.add(tree.as_pointer())
-        for node in tree.nodes:
-            if node.type == 'GROUP':
-                waiting.append(node.node_tree)
-            elif node.type in _IMAGE_NODES and not node.mute and node.image is not None:
-                if any(output.is_linked for output in node.outputs):
-                    yield node
 
 
 def start_reader():

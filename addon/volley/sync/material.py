@@ -130,17 +130,10 @@ class Materials:
                 self._entry(key, material, abi.MaterialFlags.CUTS_OUT if isinstance(key, tuple) else 0)
         return True
 
-    def is_kept(self, material):
-        """Whether an evaluated material is in the library and has not changed."""
-        return self._is_kept(material.name_full)
-
-    def _is_kept(self, key):
-        entry = self._entries.get(key)
-        return entry is not None and not entry.is_animated and not self._changes.material_of(_material_name(key))
-
     def _keep(self, key):
         """Take a material as it is in the library, if it is there and has not changed."""
-        if not self._is_kept(key):
+        entry = self._entries.get(key)
+        if entry is None or entry.is_animated or self._changes.material_of(_material_name(key)):
             return False
         self._hold(key)
         return True

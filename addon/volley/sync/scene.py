@@ -215,16 +215,13 @@ class SceneSync:
         return walk.read_mesh(item, each, pointer)
 
     def _sync_materials(self, source):
-        """Flatten the materials first: they say which attributes the meshes must bring. Their images, and
-        the world's, are read meanwhile."""
+        """Flatten the materials first: they say which attributes the meshes must bring, and the files of their images
+        are read while those are."""
         override = source.depsgraph.view_layer_eval.material_override
         kind = bpy.types.Material  # compared, as isinstance takes longer than the rest
-        shown = [data for data in source.depsgraph.ids if type(data) is kind and override in (None, data)]
-        readers = [data for data in (*shown, shown_world(source))
-                   if data is not None and uses_nodes(data) and not self._materials.is_kept(data)]
-        self._images.expect(data.node_tree for data in readers)
-        for data in shown:
-            self._materials.entry_of(data)
+        for data in source.depsgraph.ids:
+            if type(data) is kind and override in (None, data):
+                self._materials.entry_of(data)
 
     def _sync_shown_shaders(self, source):
         """Flatten what else a walk would: lights' nodes, and materials as holes."""

@@ -478,13 +478,14 @@ enum trc_alpha_mode {
 
 typedef struct trc_image_desc {
     uint32_t struct_size;   /* of this structure; checked */
-    uint32_t width, height; /* pixels, 1..65536, width * height <= 2^30; 0 with a path */
+    uint32_t width, height; /* pixels, 1..65536, width * height <= 2^30; 0 without pixels */
     uint32_t alpha_mode;    /* TRC_ALPHA_* */
     uint32_t is_srgb;     /* 1: colour values are sRGB-encoded and are linearised, 0: as they are */
     uint32_t is_float;    /* pixels are float (else uint8); ignored with a path */
     const void *pixels;   /* RGBA, bottom row first, float or uint8; NULL with a path */
     uint64_t pixel_bytes; /* size of that buffer, checked */
-    const char *path;     /* file, read at once (see reader.h); NULL with pixels */
+    const char *path;     /* file, read at once (see reader.h); NULL with pixels. Neither: an image
+                             without contents, magenta until trc_image_update gives it some */
     const char
         *color_config;       /* OpenColorIO configuration, a file; read if there is a color_space */
     const char *color_space; /* of the pixels, in the configuration: colours are converted to its
@@ -511,9 +512,16 @@ TRC_API trc_image_desc trc_image_desc_default(void);
  * where the reader's program is absent (a build without OpenImageIO) or does not run. */
 TRC_API trc_status trc_image_create(trc_scene scene, const trc_image_desc *desc, trc_id *image_out);
 
-/* Reads the file of a descriptor ahead, beside others and beside other work: trc_image_create with
- * an equal descriptor takes it from there, before the next commit, which drops what was not taken.
- * Nothing else comes of it, and it reports no file that cannot be read. */
+/* Gives an image other contents from the next commit on, of any size; errors as of trc_image_create
+ * leave it as it was. Materials that were made while it had none have smaller levels if both
+ * descriptors ask for them. */
+TRC_API trc_status trc_image_update(trc_scene scene, trc_id image, const trc_image_desc *desc);
+
+/* Reads the file of a descriptor ahead, beside others and beside other work: trc_image_create or
+ * trc_image_update with an equal descriptor takes it from there, before the next commit, which
+ * drops what was not taken. Nothing else comes of it, and it reports no file that cannot be read.
+ * To make images without contents first and to update them last lets files be read all the while.
+ */
 TRC_API trc_status trc_image_expect(trc_scene scene, const trc_image_desc *desc);
 
 /* Frees an image from the next commit on. Nodes that still read it render magenta. */

@@ -90,10 +90,9 @@ static trc_status check_image(const trc_image_desc *desc) {
     TRC_TRY(trc_check_enum(desc->is_srgb, 2, "is_srgb"));
     TRC_TRY(trc_check_enum(desc->is_mip_mapped, 2, "is_mip_mapped"));
     TRC_TRY(trc_check_enum(desc->is_alpha_literal, 2, "is_alpha_literal"));
-    if (!desc->path == !desc->pixels) {
-        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "an image needs either pixels or a path");
-    }
-    if (desc->path)
+    if (desc->path && desc->pixels)
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "an image has either pixels or a path");
+    if (desc->path || (!desc->pixels && !desc->width && !desc->height))
         return TRC_OK;
     TRC_TRY(trc_check_enum(desc->is_float, 2, "is_float"));
     return check_pixels(desc);
@@ -119,6 +118,16 @@ trc_status trc_image_create(trc_scene scene, const trc_image_desc *desc, trc_id 
         status = trc_check_out(image_out, sizeof *image_out, "image_out");
     if (status == TRC_OK)
         status = trc_scene_add_image(access.scene, desc, image_out);
+    trc_scene_leave(&access);
+    return status;
+}
+
+trc_status trc_image_update(trc_scene scene, trc_id image, const trc_image_desc *desc) {
+    struct trc_scene_access access;
+    TRC_TRY(trc_scene_enter(scene, &access));
+    trc_status status = check_image(desc);
+    if (status == TRC_OK)
+        status = trc_scene_change_image(access.scene, image, desc);
     trc_scene_leave(&access);
     return status;
 }

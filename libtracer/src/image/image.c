@@ -415,17 +415,28 @@ static trc_status load_file(const trc_image_desc *desc, const struct trc_image_s
     return TRC_OK;
 }
 
+static trc_status make_empty(const trc_image_desc *desc, struct trc_image **image_out) {
+    struct trc_image *image = trc_alloc_zeroed(1, sizeof *image);
+    if (!image)
+        return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for an image");
+    atomic_init(&image->refs, 1);
+    image->will_have_levels = desc->is_mip_mapped != 0;
+    *image_out = image;
+    return TRC_OK;
+}
+
 trc_status trc_image_load(const trc_image_desc *desc, const struct trc_image_source *source,
                           struct trc_image **image_out) {
     TRC_TRY(trc_check_struct(desc, sizeof *desc, "trc_image_desc"));
     TRC_TRY(trc_check_enum(desc->alpha_mode, TRC_ALPHA_NONE + 1, "alpha_mode"));
-    if ((desc->path != NULL) == (desc->pixels != NULL)) {
-        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "an image needs either pixels or a path");
-    }
+    if (desc->path && desc->pixels)
+        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "an image has either pixels or a path");
     if (desc->color_space && (!desc->color_config || desc->is_srgb)) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
                         "a colour space needs a configuration, and is not sRGB");
     }
+    if (!desc->path && !desc->pixels && !desc->width && !desc->height)
+        return make_empty(desc, image_out);
     struct trc_image *image = NULL;
     TRC_TRY(desc->path ? load_file(desc, source, &image) : load_pixels(desc, source, &image));
     trc_status status = limit_size(image, desc->max_side);

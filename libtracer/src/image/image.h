@@ -14,9 +14,10 @@ struct trc_image_source {
     const atomic_uint *cancel;
 };
 
-/* Copies the pixels or reads the file of a descriptor, which is checked in full. INVALID_ARGUMENT,
- * STRUCT_SIZE, TOO_LARGE, OUT_OF_MEMORY, IMAGE (unreadable file, unknown colour space), UNSUPPORTED
- * (a path or a colour space where no program reads them), CANCELLED. One holder: the caller. */
+/* Copies the pixels or reads the file of a descriptor, which is checked in full; with neither, an
+ * image without contents. INVALID_ARGUMENT, STRUCT_SIZE, TOO_LARGE, OUT_OF_MEMORY, IMAGE
+ * (unreadable file, unknown colour space), UNSUPPORTED (a path or a colour space where no program
+ * reads them), CANCELLED. One holder: the caller. */
 trc_status trc_image_load(const trc_image_desc *desc, const struct trc_image_source *source,
                           struct trc_image **image_out);
 

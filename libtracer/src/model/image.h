@@ -31,7 +31,8 @@ struct trc_image {
     enum trc_texel format;
     uint32_t is_srgb;       /* colours are sRGB-encoded: to be decoded after filtering */
     uint32_t is_associated; /* colours are multiplied by alpha: divided when alpha is used too */
-    uint32_t level_count;   /* 1: only itself; smaller ones: image/levels.h */
+    uint32_t level_count;   /* 1: only itself; smaller ones: image/levels.h; 0: no contents yet */
+    bool will_have_levels;  /* of no contents yet: if they are large enough */
     enum trc_texel level_format; /* of those: linear light */
     struct trc_image_level levels[TRC_IMAGE_MAX_LEVELS];
     bool is_halved;           /* to fit the scene's limit: worth a warning */

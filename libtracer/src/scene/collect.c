@@ -15,7 +15,8 @@ static trc_status no_memory(void) {
     return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for the scene");
 }
 
-/* An image keeps its slot for life, so materials name images by slot; destroyed ones leave NULL. */
+/* An image keeps its slot for life, so materials name images by slot; NULL: destroyed, or without
+ * contents. */
 trc_status trc_collect_images(const struct trc_scene_state *scene, struct trc_snapshot *s) {
     const struct trc_store *store = &scene->images;
     s->images = trc_alloc_zeroed(store->slot_count, sizeof *s->images);
@@ -23,7 +24,8 @@ trc_status trc_collect_images(const struct trc_scene_state *scene, struct trc_sn
         return no_memory();
     s->image_count = store->slot_count;
     for (uint32_t i = trc_store_first(store); i != TRC_STORE_END; i = trc_store_next(store, i)) {
-        s->images[i] = trc_image_retain(store->slots[i].object);
+        struct trc_image *image = store->slots[i].object;
+        s->images[i] = image->level_count ? trc_image_retain(image) : NULL;
     }
     return TRC_OK;
 }

@@ -127,6 +127,8 @@ trc_status trc_scene_add_image(struct trc_scene_state *scene, const trc_image_de
                                trc_id *id);
 /* Reads an image with a path ahead: a wish, which nothing comes of without memory. */
 void trc_scene_expect_image(struct trc_scene_state *scene, const trc_image_desc *desc);
+trc_status trc_scene_change_image(struct trc_scene_state *scene, trc_id id,
+                                  const trc_image_desc *desc);
 trc_status trc_scene_remove_image(struct trc_scene_state *scene, trc_id id);
 
 trc_status trc_scene_add_light(struct trc_scene_state *scene, const trc_light_desc *desc,

@@ -12,7 +12,7 @@ static uint32_t image_index(const void *images, trc_id image) {
 
 static bool image_has_levels(const void *images, trc_id image) {
     const struct trc_image *found = trc_store_get(images, image);
-    return found && found->level_count > 1;
+    return found && (found->level_count ? found->level_count > 1 : found->will_have_levels);
 }
 
 static trc_status compile(const struct trc_scene_state *scene, const trc_material_desc *desc,
@@ -170,6 +170,25 @@ trc_status trc_scene_add_image(struct trc_scene_state *scene, const trc_image_de
     }
     scene->changed |= TRC_CHANGED_IMAGES;
     *id = added;
+    return TRC_OK;
+}
+
+trc_status trc_scene_change_image(struct trc_scene_state *scene, trc_id id,
+                                  const trc_image_desc *desc) {
+    void *former;
+    TRC_TRY(trc_store_find(&scene->images, id, &former));
+    struct trc_image *image;
+    TRC_TRY(get_image(scene, desc, &image));
+    void **object = &scene->images.slots[trc_store_slot_of(id)].object;
+    *object = image;
+    const trc_status fit = fit_images(scene);
+    if (fit != TRC_OK) {
+        *object = former;
+        trc_image_release(image);
+        return fit;
+    }
+    trc_image_release(former);
+    scene->changed |= TRC_CHANGED_IMAGES;
     return TRC_OK;
 }
 
