@@ -59,6 +59,8 @@ PARTS = {
     "hair": lambda options: hair.measure(options, options.scope, options.out / "pictures"),
     "files": lambda options: files.measure(options, options.scope, options.out / "pictures"),
     "curves_trixie": lambda options: elsewhere.measure(options, "trixie", "curves"),
+    "denoise_trixie": lambda options: elsewhere.measure(options, "trixie", "denoise"),
+    "hair_trixie": lambda options: elsewhere.measure(options, "trixie", "hair"),
     "files_trixie": lambda options: elsewhere.measure(options, "trixie", "files"),
     "curves_sid": lambda options: elsewhere.measure(options, "sid", "curves"),
     "denoise_sid": lambda options: elsewhere.measure(options, "sid", "denoise"),

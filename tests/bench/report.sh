@@ -4,7 +4,7 @@
 #   bash tests/bench/report.sh [--quick|--full] [--out DIR] [--measure|--draw [--again DIR]]
 #                              [--baseline] [--parts PART... [--only SCENE...]]
 #
-# On two quiet cores --quick takes about 4 minutes; the default an estimated 240, --full a night.
+# On two quiet cores --quick takes about 4 minutes; the default an estimated 300, --full a night.
 # --measure draws nothing; --draw draws the report of DIR anew from its JSON, with --again a second
 # run's beside it. DIR is build/report; tests/bench/report is the committed one. With --quick the
 # ratios are compared with the committed baseline: the exit code is 1 if one of them fell far in

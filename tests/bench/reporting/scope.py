@@ -76,7 +76,7 @@ QUICK = Scope(
     largest_triangles=100_000, largest_lights=100, largest_instances=1000)
 
 MEDIUM = Scope(
-    name="medium", minutes=240,
+    name="medium", minutes=300,
     scenes=EFFECTS + JOINED, sampler_scenes=("gallery",), samples=(1, 4, 16, 64, 256, 1024),
     time_samples=(1, 4, 16, 64), seeds=10, reference_samples=1024, reference_seeds=4,
     light_samples=(1, 4), repeats=3, times_scale=TIMES_SCALE, denoise=True, elsewhere=True, farm=True,
