@@ -16,7 +16,7 @@ import error_time
 import numpy as np
 
 from . import curves, estimates
-from .scope import DENOISE_FILES, FOLDER_CURVES, picture_folders
+from .scope import DENOISE_FILES, FOLDER_DENOISE, picture_folders
 
 DENOISED = "volley denoised"
 PLAIN = curves.DEFAULT
@@ -38,7 +38,7 @@ def measure(options, scope, pictures):
     configurations = [error_time.Configuration(curves.BASE, "CYCLES"), curves.volley("SOBOL", 1),
                       error_time.Configuration(DENOISED, "VOLLEY", {**curves.volley("SOBOL", 1).volley,
                                                                     "use_denoising": True})]
-    known = picture_folders(scope.scenes + DENOISE_FILES, FOLDER_CURVES, options, pictures)
+    known = picture_folders(scope.scenes + DENOISE_FILES, FOLDER_DENOISE, options, pictures)
     folders = {name: folder for name, folder in known.items() if not options.only or name in options.only}
     for name, folder in folders.items():
         own = curves.error_options(options, made, configurations)

@@ -10,7 +10,7 @@ FILES = ("example", "many_objects", "many_lights", "many_glasses", "foliage", "m
 # Of the folder of scenes that others made, where there is one.
 FOLDER_FILES = ("conference", "robot", "knight", "lost_empire")
 FOLDER_CURVES = ("conference_motion", "robot_motion", "knight_motion")
-DENOISE_FILES = ("example",)  # at rest, for Denoise besides
+DENOISE_FILES, FOLDER_DENOISE = ("example",), (*FOLDER_CURVES, "lost_empire")  # at rest, for Denoise besides
 SAMPLERS = ("SOBOL", "SUDOKU", "JITTER", "INDEPENDENT", "BLUE_NOISE")
 # Timed pictures are 768 x 432 and larger, as users render: in small ones Blender's own part of an F12 is half.
 TIMES_SCALE = 6
