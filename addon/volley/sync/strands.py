@@ -167,7 +167,18 @@ def _places(real, system, strands, steps):
     else:  # numbers one by one: of vectors, numpy takes five times as long
         numbers = chain.from_iterable(chain.from_iterable(vectors))
         keys = np.fromiter(numbers, np.float64, 3 * steps * len(strands))
-    return keys.reshape(-1, 3)
+    return _with_ends(keys.reshape(-1, steps, 3)).reshape(-1, 3)
+
+
+def _with_ends(keys):
+    """(strands, steps, 3) with the last key of each strand in place of those after it. Strands that are cut
+    short, and children of spirals, have fewer keys than their system has steps; Blender gives zeros for the others."""
+    is_key = keys.any(axis=2)
+    if is_key[:, -1].all():
+        return keys
+    steps = np.arange(keys.shape[1])
+    last = np.where(is_key, steps, 0).max(axis=1)
+    return np.take_along_axis(keys, np.minimum(steps, last[:, None])[..., None], axis=1)
 
 
 def _in_box(points, middle, half):
@@ -273,7 +284,6 @@ def _values(data, name, field, width, default=0.0):
 def _hair_radii(settings, strands):
     """Radii of hair, from root to tip by the settings' shape."""
     left = 1.0 - strands.fractions[0].clip(0.0, 1.0)
-    is_tip = left <= 0.0
     shape = settings.shape
     if shape < 0.0:
         left = left ** (1.0 + shape)
@@ -282,5 +292,5 @@ def _hair_radii(settings, strands):
     root, tip = (radius * settings.radius_scale * 0.5 for radius in (settings.root_radius, settings.tip_radius))
     radii = left * (root - tip) + tip
     if settings.use_close_tip:
-        radii[is_tip] = 0.0
+        radii[np.cumsum(strands.lengths) - 1] = 0.0  # of keys in the same place the last alone, as in Cycles
     return radii
