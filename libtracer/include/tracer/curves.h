@@ -67,8 +67,9 @@ typedef struct trc_curves_desc {
 /* One key of no points, ribbons of 4 pieces at most, within a tenth of the radius. */
 TRC_API trc_curves_desc trc_curves_desc_default(void);
 
-/* Copies curves into the scene. Pieces that are not finite, beyond 1.8e18 or of radius 0 at some
- * key at both ends are skipped and counted as triangles are (trc_scene_stats). Instances whose
+/* Copies curves into the scene. Pieces that are not finite or beyond 1.8e18 at some key are skipped
+ * and counted as triangles are (trc_scene_stats); those of radius 0 at some key at both ends are
+ * skipped. Instances whose
  * transform flattens them are hidden. Hits tell pieces for triangles, in the order of points; u
  * goes along a piece, v across it from -1 to 1 (trc_hits). They are no lights, however they shine,
  * and displacement does not move them. Renders let no ray meet again the strand that it left;

@@ -83,6 +83,7 @@ static trc_status tree_build(struct create_job *job, const struct trc_part *part
         return status;
     tree->triangle_count = refs.triangle_count;
     tree->skipped_count = total - refs.triangle_count;
+    tree->thin_count = refs.thin_count;
     job->stats->built_count++;
     return TRC_OK;
 }
@@ -624,7 +625,7 @@ static trc_status trees_build(struct create_job *job, struct trc_mesh *const *re
 
 static void stats_add(const struct trc_tree *tree, struct trc_bvh_build_stats *stats) {
     stats->bytes += tree->bytes;
-    stats->skipped_triangles += tree->skipped_count;
+    stats->skipped_triangles += tree->skipped_count - tree->thin_count;
 }
 
 static void stats_collect(const struct trc_bvh *bvh, struct trc_bvh_build_stats *stats) {

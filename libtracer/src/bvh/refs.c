@@ -11,17 +11,35 @@
 #include "core/core.h"
 #include "core/pool.h"
 
+static bool ends_are_valid(const f4 p[2], const float r[2]) {
+    const f4 limit = f4_set(TRC_MAX_COORDINATE);
+    /* False for what is not a number. */
+    return i4_all((f4_abs(p[0]) <= limit) & (f4_abs(p[1]) <= limit)) &&
+           r[0] <= TRC_MAX_COORDINATE && r[1] <= TRC_MAX_COORDINATE;
+}
+
+/* Whether both ends of a piece of a curve are valid at all keys. */
+static bool piece_is_valid(const struct trc_mesh *mesh, uint32_t piece) {
+    for (uint32_t key = 0; key < mesh->key_count; key++) {
+        f4 p[2];
+        float r[2];
+        trc_piece_ends(mesh, piece, key, p, r);
+        if (!ends_are_valid(p, r))
+            return false;
+    }
+    return true;
+}
+
 /* Box of a piece of a curve, the mean over its keys; false where an end is not valid at some key,
  * or neither has a radius. */
 static bool piece_ref(const struct trc_mesh *mesh, uint32_t piece, struct trc_ref *ref) {
-    const f4 share = f4_set(1.0f / (float)mesh->key_count), limit = f4_set(TRC_MAX_COORDINATE);
+    const f4 share = f4_set(1.0f / (float)mesh->key_count);
     f4 lower = f4_set(0.0f), upper = f4_set(0.0f);
     for (uint32_t key = 0; key < mesh->key_count; key++) {
         f4 p[2];
         float r[2];
         trc_piece_ends(mesh, piece, key, p, r);
-        if (!i4_all((f4_abs(p[0]) <= limit) & (f4_abs(p[1]) <= limit)) ||
-            !(r[0] <= TRC_MAX_COORDINATE && r[1] <= TRC_MAX_COORDINATE && r[0] + r[1] > 0.0f))
+        if (!ends_are_valid(p, r) || r[0] + r[1] <= 0.0f)
             return false;
         lower += f4_min(p[0] - f4_set(r[0]), p[1] - f4_set(r[1])) * share;
         upper += f4_max(p[0] + f4_set(r[0]), p[1] + f4_set(r[1])) * share;
@@ -57,6 +75,7 @@ static bool triangle_ref(const struct trc_part *part, uint32_t triangle, struct 
 #define BLOCK_TRIANGLES 8192
 struct ref_block {
     uint32_t part, begin, end;  /* triangles */
+    uint32_t thin_count;        /* valid pieces of curves without a radius */
     struct trc_range range;     /* its refs, from where they would be if none were joined */
     uint32_t pieces, triangles; /* its refs when clipped, and their triangles */
     bool is_clipped;
@@ -75,13 +94,16 @@ static void collect_task(void *context, uint32_t index, uint32_t worker) {
     (void)worker;
     const struct ref_job *job = context;
     struct ref_block *block = &job->blocks[index];
+    const struct trc_part *part = &job->parts[block->part];
     uint32_t count = 0;
     if (job->cancel && *job->cancel)
         return;
     for (uint32_t t = block->begin; t < block->end; t++) {
         struct trc_ref *ref = &block->range.refs[count];
-        if (!triangle_ref(&job->parts[block->part], t, ref))
+        if (!triangle_ref(part, t, ref)) {
+            block->thin_count += part->mesh->strands && piece_is_valid(part->mesh, t);
             continue;
+        }
         ref->part = block->part;
         ref->primitive = t;
         if (!count || !trc_cluster_join(ref - 1, ref))
@@ -204,6 +226,7 @@ trc_status trc_refs_collect(const struct trc_part *parts, uint32_t part_count,
         b->pieces = b->range.count;
         b->triangles = b->range.triangles;
         out->triangle_count += b->triangles;
+        out->thin_count += b->thin_count;
         if (b->range.count > 0) /* else not measured, where it was cancelled */
             box_grow(&all->bounds, b->range.bounds);
     }

@@ -9,6 +9,7 @@ struct trc_refs {
     struct trc_ref *memory;  /* of refs and their spare memory */
     struct trc_range all;    /* triangles: those in several refs once for each */
     uint32_t triangle_count; /* that are valid */
+    uint32_t thin_count;     /* valid pieces of curves that are left out for want of a radius */
     bool is_clipped;         /* some boxes hold a part of their triangles */
 };
 

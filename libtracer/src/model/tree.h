@@ -133,6 +133,7 @@ struct trc_tree {
     float lower[3], upper[3]; /* over all keys; lower > upper when empty */
     float extent;             /* largest |coordinate| of the bounds: scale of rounding errors */
     uint64_t triangle_count, skipped_count;
+    uint64_t thin_count; /* skipped pieces of curves that are valid, but have no radius */
     float sah_cost;
     uint64_t bytes;
 };
