@@ -16,6 +16,7 @@ RELATIVE, ABSOLUTE = 0.01, 3e-4
 # In the world of radiance 1.
 WORLD_SIZE, WORLD_SAMPLES, WORLD_ABSOLUTE = (16, 16), 256, 2e-3
 IN_WORLD = "diffuse", "rough diffuse", "translucent", "velvet", "velvet node"
+AWAY_DEGREES, AWAY_SUN_DEGREES = (140, 164, 175), 20
 LENGTHS, LENGTHS_DEGREES = (0.0, 0.4, 1.7), 20
 LENGTHS_3 = LENGTHS[:1]  # Cycles 3.4 takes others as they are, of which not all is followed
 
@@ -141,6 +142,16 @@ def inside_means_of_lengths():
     return means
 
 
+def inside_means_facing_away():
+    """{degrees of the normal: (ours, theirs)} of what is translucent."""
+    means = {}
+    for degrees in AWAY_DEGREES:
+        _stage("translucent", False, degrees, (4, 4))
+        _shine(AWAY_SUN_DEGREES)
+        means[degrees] = _means_by_both(SAMPLES)
+    return means
+
+
 def inside_means_in_world():
     """{(shader, whether it is smooth, degrees of the normal): (ours, theirs)}."""
     import bpy
@@ -208,3 +219,10 @@ def test_lengths(blender):
     assert ("Principled gloss", LENGTHS[0]) in means
     for (name, length), (ours, theirs) in means.items():
         assert ours == pytest.approx(theirs, rel=RELATIVE, abs=ABSOLUTE), f"{name}, {length} long"
+
+
+def test_translucent_facing_away(blender):
+    """Lights before it shine through what has a normal that faces away: it had none of their light."""
+    for degrees, (ours, theirs) in blender.run(inside_means_facing_away).items():
+        assert theirs > 0.3
+        assert ours == pytest.approx(theirs, rel=RELATIVE), f"normal at {degrees} degrees"

@@ -79,12 +79,18 @@ TRC_INLINE bool is_transmissive(const struct trc_lobe *lobe, bool rare) {
            (rare && (lobe->kind == TRC_LOBE_HAIR_TRANSMIT || lobe->is_whole_glass));
 }
 
-/* Active lanes in which a lobe may have light from wi. */
-TRC_INLINE vmask side_of(const struct trc_lobe *lobe, vvec3 wi, struct sides sides, vmask active,
-                         bool rare) {
+/* Active lanes in which a lobe may have light from wi. What is translucent and has a normal that
+ * faces away transmits to the side that is seen, as in Cycles. */
+TRC_INLINE vmask side_of(const struct trc_lobe *lobe, const struct trc_surface *s, vvec3 wi,
+                         struct sides sides, vmask active, bool rare) {
     if (is_reflection(lobe->kind))
         return sides.above;
-    return rare && is_hair(lobe->kind) ? active : through_lobe(lobe, wi, sides.below);
+    if (rare && is_hair(lobe->kind))
+        return active;
+    vmask below = sides.below;
+    if (rare && lobe->kind == TRC_LOBE_TRANSLUCENT)
+        below = vm_or(below, vm_and(active, vf_lt(v3_dot(lobe->n, s->n), vf_zero())));
+    return through_lobe(lobe, wi, below);
 }
 
 /* rare: whether l has anything rare; a constant, so that others have no test of it. */
@@ -95,7 +101,7 @@ TRC_INLINE void sum_lobes(const struct trc_lobes *l, const struct trc_surface *s
     out->pdf = vf_zero();
     for (int i = 0; i < l->count; i++) {
         const struct trc_lobe *lobe = &l->lobe[i];
-        const vmask side = side_of(lobe, wi, sides, active, rare);
+        const vmask side = side_of(lobe, s, wi, sides, active, rare);
         if (lobe->kind == TRC_LOBE_TRANSPARENT || !vm_any(side))
             continue;
         struct lobe_value r = value_of(l, lobe, s, wi, side, rare);
@@ -136,7 +142,7 @@ TRC_INLINE void weigh_direction(const struct trc_lobes *l, const struct trc_surf
     vfloat pdf = vf_zero(), picked = vf_zero(), claimed = vf_zero();
     for (int i = 0; i < l->count; i++) {
         const struct trc_lobe *lobe = &l->lobe[i];
-        const vmask side = side_of(lobe, out->wi, sides, active, rare);
+        const vmask side = side_of(lobe, s, out->wi, sides, active, rare);
         if (lobe->kind == TRC_LOBE_TRANSPARENT || !vm_any(side))
             continue;
         struct lobe_value r = value_of(l, lobe, s, out->wi, side, rare);
