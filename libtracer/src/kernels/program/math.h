@@ -4,6 +4,7 @@
 #define TRACER_KERNELS_PROGRAM_MATH_H
 
 #include <float.h>
+#include <math.h>
 
 #include "kernels/program/values.h"
 #include "model/program.h"
@@ -77,6 +78,39 @@ static vfloat math_compare(vfloat a, vfloat b, vfloat c) {
     return vf_truth(vm_or(vf_eq(a, b), near));
 }
 
+/* Up to which angles in radians vf_sincos has all digits. */
+#define TRC_LARGEST_ANGLE 8192.0f
+
+/* Larger angles, one after the other by the C library. */
+static __attribute__((noinline)) vfloat of_large_angles(vfloat x, vfloat small,
+                                                        float (*function)(float)) {
+    const uint32_t large = vm_bits(vf_gt(vf_abs(x), vf_set(TRC_LARGEST_ANGLE)));
+    float values[TRC_WIDTH];
+    vf_store(values, small);
+    for (uint32_t rest = large; rest; rest &= rest - 1) {
+        const int lane = __builtin_ctz(rest);
+        values[lane] = function(vf_get(x, lane));
+    }
+    return vf_load(values);
+}
+
+TRC_INLINE bool has_large_angle(vfloat x) {
+    return vm_any(vf_gt(vf_abs(x), vf_set(TRC_LARGEST_ANGLE)));
+}
+
+static vfloat math_sine(vfloat x) {
+    const vfloat small = vf_sin(x);
+    return has_large_angle(x) ? of_large_angles(x, small, sinf) : small;
+}
+static vfloat math_cosine(vfloat x) {
+    const vfloat small = vf_cos(x);
+    return has_large_angle(x) ? of_large_angles(x, small, cosf) : small;
+}
+static vfloat math_tangent(vfloat x) {
+    const vfloat small = vf_tan(x);
+    return has_large_angle(x) ? of_large_angles(x, small, tanf) : small;
+}
+
 /* Ties go up. */
 static vfloat math_round(vfloat a) { return vf_floor(a + vf_set(0.5f)); }
 
@@ -140,11 +174,11 @@ static vfloat op_math(uint32_t mode, vfloat a, vfloat b, vfloat c) {
     case TRC_MATH_PINGPONG:
         return math_ping_pong(a, b);
     case TRC_MATH_SINE:
-        return vf_sin(a);
+        return math_sine(a);
     case TRC_MATH_COSINE:
-        return vf_cos(a);
+        return math_cosine(a);
     case TRC_MATH_TANGENT:
-        return vf_tan(a);
+        return math_tangent(a);
     case TRC_MATH_ARCSINE:
         return vf_asin(a);
     case TRC_MATH_ARCCOSINE:
@@ -252,11 +286,11 @@ static vvec3 op_vector_math(uint32_t mode, vvec3 a, vvec3 b, vvec3 c, vfloat sca
     case TRC_VECTOR_FRACT:
         return v3_sub(a, v3_floor(a));
     case TRC_VECTOR_SINE:
-        return v3(vf_sin(a.x), vf_sin(a.y), vf_sin(a.z));
+        return v3(math_sine(a.x), math_sine(a.y), math_sine(a.z));
     case TRC_VECTOR_COSINE:
-        return v3(vf_cos(a.x), vf_cos(a.y), vf_cos(a.z));
+        return v3(math_cosine(a.x), math_cosine(a.y), math_cosine(a.z));
     case TRC_VECTOR_TANGENT:
-        return v3(vf_tan(a.x), vf_tan(a.y), vf_tan(a.z));
+        return v3(math_tangent(a.x), math_tangent(a.y), math_tangent(a.z));
     case TRC_VECTOR_SNAP:
         return v3(math_snap(a.x, b.x), math_snap(a.y, b.y), math_snap(a.z, b.z));
     case TRC_VECTOR_MODULO:
