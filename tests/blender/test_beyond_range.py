@@ -7,6 +7,16 @@ OPERATIONS = 'SINE', 'COSINE', 'TANGENT'
 ANGLES = 1e4, -1e6, 1e9, -1e20
 CELL_PX = 4
 SHIFT = 10.0  # which makes all that is shown positive
+COLORS = (-0.5, 0.5, 0.5), (-0.5, -0.5, 0.5), (-0.2, -0.2, -0.2), (-2.0, 0.5, 0.5)
+SAMPLES = 64
+
+
+def _given(tree, kind, values):
+    """What a node of that kind gives, which takes numbers."""
+    node = tree.nodes.new(kind)
+    for socket, value in zip(node.inputs, values):
+        socket.default_value = value
+    return node.outputs[0]
 
 
 def inside_angles():
@@ -35,9 +45,39 @@ def inside_angles():
     return scenes.by_both(1)
 
 
+def _lit(samples):
+    """Mean colours by both of what is lit by a lamp and an even world."""
+    import scenes
+    scenes.camera(location=(0.0, -5.0, 0.0), type='ORTHO', ortho_scale=2.5)
+    scenes.light('AREA', location=(1.0, -3.0, 2.0), rotation=(0.8, 0.2, 0.2), energy=200.0)
+    scenes.light_world((0.3, 0.4, 0.5))
+    return [picture[..., :3].mean(axis=(0, 1)) for picture in scenes.by_both(samples)]
+
+
+def inside_panes():
+    """{colour: both} of a matt wall behind a transparent pane of that colour."""
+    import scenes
+    found = {}
+    for color in COLORS:
+        scenes.empty(size=(24, 24))
+        clear = scenes.material("Clear", "ShaderNodeBsdfTransparent")
+        linked = _given(clear.node_tree, "ShaderNodeCombineXYZ", color)
+        clear.node_tree.links.new(linked, scenes.shader_of(clear).inputs["Color"])
+        scenes.wall("Pane", 2.0, -1.0, material=clear)
+        scenes.wall("Wall", 3.0, 1.0, material=scenes.material("Matt", "ShaderNodeBsdfDiffuse"))
+        found[color] = _lit(SAMPLES)
+    return found
+
+
 def test_large_angles(blender):
     """Sines of a million were off by .03, of more not numbers."""
     ours, theirs = (picture[CELL_PX // 2::CELL_PX, CELL_PX // 2::CELL_PX, 0] for picture in
                     blender.run(inside_angles))
     assert (theirs > 0.0).all() and theirs.std() > 0.3
     assert ours == pytest.approx(theirs, rel=1e-4)
+
+
+def test_transparent_colors_below_zero(blender):
+    """They were 0: behind one of -.5 there was four times the light."""
+    for color, (ours, theirs) in blender.run(inside_panes).items():
+        assert ours == pytest.approx(theirs, abs=0.005), color

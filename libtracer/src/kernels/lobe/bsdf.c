@@ -217,7 +217,7 @@ static void take_ideal(const struct trc_lobes *l, const struct trc_lobe *lobe,
     out->wi = v3_select(m, wi, out->wi);
     out->weight = v3_select(m, weight, out->weight);
     out->singular = vm_or(out->singular, m);
-    out->valid = vm_or(out->valid, vm_and(m, vf_gt(v3_max(weight), vf_zero())));
+    out->valid = vm_or(out->valid, vm_and(m, vf_gt(v3_max(v3_abs(weight)), vf_zero())));
 }
 
 TRC_INLINE void sample_lobes(const struct trc_lobes *l, const struct trc_surface *s, vfloat u_lobe,

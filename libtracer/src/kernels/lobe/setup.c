@@ -99,7 +99,7 @@ static void set_chances(const struct trc_material *m, const struct trc_surface *
     out->continue_weight = vf_zero();
     for (int i = 0; i < out->count; i++) {
         struct trc_lobe *lobe = &out->lobe[i];
-        const vmask present = vf_gt(v3_max(lobe->weight), vf_zero());
+        const vmask present = vf_gt(v3_max(v3_abs(lobe->weight)), vf_zero());
         lobe->mix_weight = vf_where(present, vf_max(lobe->mix_weight, floor_weight));
         out->mix_weight = out->mix_weight + lobe->mix_weight;
         if (trc_lobe_ends(lobe->kind))

@@ -3,19 +3,21 @@
 
 void trc_add_transparent(struct trc_setup *c, vvec3 weight) {
     static const struct trc_lobe_model model = {.kind = TRC_LOBE_TRANSPARENT};
+    /* As in Cycles, colours below 0 take light away, and count by their mean. */
+    const vfloat mean = vf_abs(v3_average(weight));
     for (int i = 0; i < c->out->count; i++) {
         struct trc_lobe *lobe = &c->out->lobe[i];
         if (lobe->model != &model)
             continue;
-        const vfloat mean = vf_abs(v3_average(weight));
         const vmask counts = vm_and(c->s->active, vf_ge(mean, vf_set(TRC_WEIGHT_CUTOFF)));
         lobe->weight = v3_add(lobe->weight, v3_where(counts, weight));
         lobe->mix_weight = lobe->mix_weight + vf_where(counts, mean);
         return;
     }
-    struct trc_lobe *lobe = trc_add_lobe(c, &model, weight);
+    struct trc_lobe *lobe = trc_add_lobe(c, &model, v3_splat(mean));
     if (!lobe)
         return;
+    lobe->weight = v3_where(vf_gt(lobe->mix_weight, vf_zero()), weight);
     lobe->n = c->s->n;
     lobe->cos_o = v3_dot(lobe->n, c->s->wo);
     lobe->ideal = vm_all_set();

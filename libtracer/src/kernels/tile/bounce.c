@@ -147,7 +147,7 @@ static void ray_push(struct trc_tile *t, const struct arrival *a, const struct t
  * (Boulos et al. 2007). */
 static vmask attenuate(const struct trc_tile *t, const struct arrival *a,
                        const struct trc_bsdf_sample *b, vmask active) {
-    const vfloat size = v3_max(v3_mul(a->weight, b->weight));
+    const vfloat size = v3_max(v3_abs(v3_mul(a->weight, b->weight)));
     active = vm_and(active, is_light(size));
     if (t->desc->integrator == TRC_INTEGRATOR_DISTRIBUTION)
         return active;
@@ -184,7 +184,7 @@ vfloat trc_bounce_chance(const struct trc_tile *t, const struct arrival *a,
         if (!trc_lobe_ends(lobes->lobe[i].kind))
             full = full + lobes->lobe[i].sample_weight * full_weight_of(&lobes->lobe[i]);
     }
-    const vfloat brings = v3_max(a->weight) * lobes->continue_weight;
+    const vfloat brings = v3_max(v3_abs(a->weight)) * lobes->continue_weight;
     const vmask some = vf_gt(full, vf_zero());
     return vf_where(some, vf_min(vf_divide(brings * lobes->continue_weight, full), one));
 }

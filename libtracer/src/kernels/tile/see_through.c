@@ -123,7 +123,7 @@ static uint32_t chunk_take(struct trc_tile *t, const struct trc_packet *p,
     vf_store(factor[0], through.x);
     vf_store(factor[1], through.y);
     vf_store(factor[2], through.z);
-    const uint32_t goes_on = vm_bits(vf_gt(v3_max(through), vf_zero()));
+    const uint32_t goes_on = vm_bits(vf_gt(v3_max(v3_abs(through)), vf_zero()));
     const uint32_t counts = vm_bits(vm_andnot(met, leaves));
     uint32_t count = 0;
     for (uint32_t bits = vm_bits(met); bits; bits &= bits - 1) {
