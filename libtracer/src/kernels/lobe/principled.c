@@ -53,9 +53,10 @@ static void principled_specular(struct trc_setup *c, const struct trc_leaf *leaf
     lobe->ior =
         vf_set(2.0f) / (vf_one() - vf_safe_sqrt(vf_set(SPECULAR_SCALE) * specular)) - vf_one();
     lobe->alpha_x = lobe->alpha_y = alpha;
-    lobe->anisotropic = may_exceed_zero(c, leaf, TRC_AT(PRINCIPLED, anisotropic));
+    const struct trc_operand *twist = input(c, leaf, TRC_AT(PRINCIPLED, anisotropic));
+    lobe->anisotropic = twist->reg >= 0 || twist->value != 0.0f;
     if (lobe->anisotropic) {
-        const vfloat aspect = aspect_of(number(c, leaf, TRC_AT(PRINCIPLED, anisotropic)));
+        const vfloat aspect = aspect_of(trc_operand_value(twist, c->regs));
         lobe->alpha_x = alpha / aspect;
         lobe->alpha_y = alpha * aspect;
         lobe->tangent = trc_leaf_tangent(c, leaf, TRC_AT(PRINCIPLED, tangent), n,
