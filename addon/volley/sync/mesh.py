@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 
 from .. import abi, native
-from ..compat import UNWRAPS_LONGITUDES
+from ..compat import HAS_FEW_STANDARD_ATTRIBUTES, UNWRAPS_LONGITUDES
 from . import derived, standard_attributes, tangents
 from .attribute_values import colors_at_vertices, colors_of, group_colors, is_pair, named_colors, widen
 
@@ -442,6 +442,10 @@ def _named_values(mesh, data, name, loops, group_names):
     layer = standard_attributes.map_of_tangents(mesh, name)
     if layer is not None or name == standard_attributes.TANGENT and not mesh.uv_layers:
         return widen(_tangents(mesh, data, layer, loops, tangents.vectors_of_corners))
+    if HAS_FEW_STANDARD_ATTRIBUTES:
+        layer = standard_attributes.map_of_tangents(mesh, name, standard_attributes.SIGN)
+        if layer is not None or name == standard_attributes.SIGN and not mesh.uv_layers:
+            return widen(_tangents(mesh, data, layer, loops)[:, 2:3])
     return _attribute_values(mesh, name, loops, group_names)
 
 

@@ -9,7 +9,7 @@ NORMAL, UV, GENERATED, TANGENT = "N", "uv", "generated", "tangent"
 # Cycles 5 keeps neither. It makes the second of the vertices after they are where objects stand that are still and
 # alone, which are most, and all are taken for such.
 FACE_NORMAL, UNDISPLACED = (None, None) if HAS_FEW_STANDARD_ATTRIBUTES else ("Ng", "undisplaced")
-OF_MAP = "." + TANGENT  # after the name of a UV map
+SIGN = TANGENT + "_sign"  # how the tangents of a UV map are handed, from Cycles 5 on
 IS_NORMAL_WORLD = HAS_FEW_STANDARD_ATTRIBUTES  # in Cycles of objects that stand still and alone, which are most
 
 # Of volumes, strands, points or of Cycles' own: attributes of Blender under such a name cannot be read.
@@ -24,11 +24,12 @@ def source(name):
     return NOTHING if name in _FOREIGN else _DERIVED.get(name, name)
 
 
-def map_of_tangents(mesh, name):
-    """The UV map of a mesh whose tangents an attribute of that name is, None for none. From Cycles 5 on
-    attributes of Blender go first."""
-    if name == TANGENT:
+def map_of_tangents(mesh, name, kind=TANGENT):
+    """The UV map of a mesh whose tangents an attribute of that name is, None for none; kind: or SIGN. From Cycles 5 on
+    attributes of Blender go before tangents."""
+    if name == kind:
         return next((layer for layer in mesh.uv_layers if layer.active_render), None)
-    if not name.endswith(OF_MAP) or HAS_FEW_STANDARD_ATTRIBUTES and name in mesh.attributes:
+    is_own = HAS_FEW_STANDARD_ATTRIBUTES and kind == TANGENT and name in mesh.attributes
+    if is_own or not name.endswith("." + kind):
         return None
-    return mesh.uv_layers.get(name[:-len(OF_MAP)])
+    return mesh.uv_layers.get(name[:-len("." + kind)])
