@@ -69,13 +69,12 @@ TRC_API trc_curves_desc trc_curves_desc_default(void);
 
 /* Copies curves into the scene. Pieces that are not finite or beyond 1.8e18 at some key are skipped
  * and counted as triangles are (trc_scene_stats); those of radius 0 at some key at both ends are
- * skipped. Instances whose
- * transform flattens them are hidden. Hits tell pieces for triangles, in the order of points; u
- * goes along a piece, v across it from -1 to 1 (trc_hits). They are no lights, however they shine,
- * and displacement does not move them. Renders let no ray meet again the strand that it left;
- * queries know of no strand that a ray left. Cost: 16 bytes for each piece's end and key, which the
- * tree has once more. INVALID_ARGUMENT, TOO_LARGE (of 4 * ends * key_count floats there can be
- * 2^31) or OUT_OF_MEMORY. */
+ * skipped. Instances whose transform flattens them are hidden. Hits tell pieces for triangles, in
+ * the order of points; u goes along a piece, v across it from -1 to 1 (trc_hits). They are no
+ * lights, however they shine, and displacement does not move them. Renders let no ray meet again
+ * the strand that it left; queries know of no strand that a ray left. Cost: 16 bytes for each
+ * piece's end and key, which the tree has once more. INVALID_ARGUMENT, TOO_LARGE (of 4 * ends *
+ * key_count floats there can be 2^31) or OUT_OF_MEMORY. */
 TRC_API trc_status trc_curves_create(trc_scene scene, const trc_curves_desc *desc,
                                      trc_id *mesh_out);
 
