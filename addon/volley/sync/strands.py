@@ -152,9 +152,10 @@ def _has_force(blender_object):
 
 
 def _shown_strands(system):
-    """Numbers of the strands of a system that are seen: its particles come before their children."""
+    """Numbers of the strands of a system that are seen: its particles come before their children, beside which
+    Cycles shows none of them, whatever the system's Parents is."""
     parent_count, child_count = len(system.particles), len(system.child_particles)
-    first = parent_count if child_count and not system.settings.use_parent_particles else 0
+    first = parent_count if child_count else 0
     return range(first, parent_count + child_count)
 
 
