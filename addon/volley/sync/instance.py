@@ -63,6 +63,7 @@ class Item:
     light: dict = None         # fields of a light instead of a mesh
     motion_keys: int = 1       # how many the object asks for
     deforms: bool = False      # whether the mesh may change its shape in time
+    is_particle: bool = False  # and is therefore hidden where one of its motion keys is missing
 
 
 _PLAIN_LENGTH = 2  # of the key of an object that stands for itself

@@ -87,7 +87,7 @@ class SceneSync:
         told = self.warnings.count()  # what moves is looked at again by each sync
         walk.send_deforming()
         in_world = self._meshes.in_world() if source.v3d is None else set()
-        self._instances.update(walk.items.values(), self._meshes.ids(), in_world, self._materials.moving())
+        self._instances.update(walk.present_items(), self._meshes.ids(), in_world, self._materials.moving())
         self._lights.update(walk.lights)
         messages += self.warnings.after(told)
         self._meshes.end()

@@ -47,6 +47,7 @@ class Walk:
         self.names = frozenset(uv_names), frozenset(color_names), needs_generated
         self._wanted_strands = curves.Wanted.of_scene(self.names, self._scene)
         self._tangents = None  # pointer of a mesh -> the tangents that its objects' materials read
+        self._missing = set()  # keys of items that are not there at all times of the shutter
         self._owners = {}     # pointer of a mesh -> key of its owner, within this walk
         self._deforming = {}  # owner key -> _Deforming
         self.items = {}       # key -> Item with a mesh
@@ -119,11 +120,21 @@ class Walk:
     def follow_motion(self, camera_keys):
         """Look at every moving thing at its other times."""
         named = Changes()
+        particles = {key for key, item in self.items.items() if item.is_particle}
         for fraction in self.times(camera_keys):
             named.note(self._source.depsgraph)
+            missing = set(particles) if self._needs_all(named) else set()
             for each in self._instances_of(named):
+                key = instance.key_of(each)
                 self._move_hair(each, fraction)
-                self.look_again(self.items.get(instance.key_of(each)), each, fraction)
+                self.look_again(self.items.get(key), each, fraction)
+                missing.discard(key)
+            self._missing.update(key for key in missing
+                                 if motion.key_index(fraction, self.items[key].motion_keys) is not None)
+
+    def present_items(self):
+        """The items without particles that are born or die while the shutter is open, which Cycles hides."""
+        return [item for key, item in self.items.items() if key not in self._missing]
 
     def send_deforming(self):
         """Send the meshes that waited for their motion keys."""
@@ -145,9 +156,12 @@ class Walk:
             if v3d is None or instance.is_in_view(each, v3d):
                 yield each
 
+    def _needs_all(self, named):
+        return named.structure or not self.tied.isdisjoint(named.objects)
+
     def _instances_of(self, named):
         """The instances of what Blender has named; all where objects with hair or instances are among it."""
-        if named.structure or not self.tied.isdisjoint(named.objects):
+        if self._needs_all(named):
             return self._instances()
         depsgraph = self._source.depsgraph
         return [instance.Plain(self._source.originals.get(name).evaluated_get(depsgraph)) for name in named.objects]
@@ -199,6 +213,7 @@ class Walk:
         if self._shutter is not None:
             item.motion_keys = motion.key_count(each.object, instance.maker_of(each))
             item.transforms *= item.motion_keys
+            item.is_particle = each.is_instance and each.particle_system is not None
 
     def _add_hair(self, each):
         """The hair of an object's particle systems, each a mesh of one material."""
