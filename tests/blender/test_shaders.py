@@ -111,6 +111,10 @@ _add("principled", _PRINCIPLED, {"Base Color": _GOLD, "Emission Color": (0.2, 0.
      Emission_Strength=(0.25,))
 _add("principled", _PRINCIPLED, {"Base Color": _GOLD, "Roughness": 0.3}, Specular_IOR_Level=(0.0, 1.0),
      Specular_Tint=((1.0, 1.0, 1.0), (1.0, 0.4, 0.2)), IOR=(1.2, 2.0))
+# An index as glTF importers have it: above 2 + sqrt(3) less is reflected before the edge than head-on. A factor that
+# went below F0 there was up to 23 % of a ball off.
+_add("principled", _PRINCIPLED, {"Base Color": _GOLD}, Specular_IOR_Level=(0.5,), Specular_Tint=((1.0, 0.4, 0.2),),
+     IOR=(8.0, 1000.0), Roughness=(0.0, 0.5))
 _add("principled", _PRINCIPLED, {"Base Color": _GOLD, "Sheen Weight": 1.0}, Sheen_Roughness=(0.2, 0.8))
 _add("principled", _PRINCIPLED, {"Base Color": _GOLD, "Coat Weight": 1.0}, Coat_Roughness=(0.03, 0.5),
      Coat_Tint=((1.0, 1.0, 1.0), (0.3, 0.8, 0.9)), Coat_IOR=(1.3, 2.0))

@@ -49,6 +49,16 @@ def fresnel(cosine, eta):
     return np.where(g2 > 0, np.minimum(0.5 * (rest / total) ** 2 * (1 + b * b), 1), 1)
 
 
+def blend(cosine, eta):
+    """How far the reflectance of a dielectric is from that head-on to 1.
+
+    >>> blend(np.array([1.0, 0.5]), 1.5).round(3).tolist(), blend(np.array([0.5]), 1000.0).tolist()
+    ([0.0, 0.051], [0.0])
+    """
+    normal = ((eta - 1) / (eta + 1)) ** 2
+    return np.clip((fresnel(cosine, eta) - normal) / (1 - normal), 0, 1)
+
+
 def schlick(cosine, _eta):
     """How far Schlick's approximation is from the reflectance head-on to 1, whatever the index."""
     return (1 - cosine) ** 5
@@ -198,12 +208,11 @@ def glass_share(sizes):
 def dielectric_share(sizes):
     found = []
     for w in steps(sizes["TRC_SHARE_SLICES"]):
-        ior = max(index_of((sizes["TRC_SHARE_REACH"] * w) ** 2), 1 + BESIDE_SHARE)
-        normal = ((ior - 1) / (ior + 1)) ** 2
+        ior = max(index_of(w * w), 1 + BESIDE_SHARE)
         for a in rows(sizes["TRC_SHARE_ROWS"]):
             for c in columns(sizes["TRC_SHARE_COLUMNS"]):
-                both = albedos(a, c, ior)
-                found.append(max((both[4] / both[0] - normal) / (1 - normal), 0))
+                both = albedos(a, c, ior, blend)
+                found.append(both[4] / both[0])
     return np.array(found)
 
 

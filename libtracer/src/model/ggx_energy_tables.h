@@ -20,10 +20,9 @@
 #define TRC_GLASS_SHARE_ROWS 5
 #define TRC_GLASS_SHARE_COLUMNS 9
 #define TRC_GLASS_SHARE_REACH 0.5f /* an ior of 3 or 1/3 */
-#define TRC_SHARE_SLICES 6
+#define TRC_SHARE_SLICES 13
 #define TRC_SHARE_ROWS 8
 #define TRC_SHARE_COLUMNS 12
-#define TRC_SHARE_REACH 0.8f
 
 /* Albedos in parts of 65535, two of which one gather reads. */
 

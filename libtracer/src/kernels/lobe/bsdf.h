@@ -33,6 +33,7 @@ enum {
     TRC_FRESNEL_NONE,       /* 1 (glass has the factor of the macro normal in its weight) */
     TRC_FRESNEL_BLEND,      /* f0 to f90 as the dielectric of index ior goes from F(0) to 1; 1 minus
                                it for refraction */
+    TRC_FRESNEL_OVERSHOOT,  /* the same of Blender 3.4: where F is below F(0), beyond f0 */
     TRC_FRESNEL_DIELECTRIC, /* F of ior for reflection, 1 - F for refraction */
     TRC_FRESNEL_OWN,        /* trc_lobe.reflectance; 1 minus it for refraction */
     TRC_FRESNEL_METAL       /* the same, of trc_metal_fresnel: f90 is the dip */

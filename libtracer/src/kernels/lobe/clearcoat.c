@@ -40,5 +40,5 @@ void trc_add_clearcoat(struct trc_setup *c, vvec3 weight, vvec3 n, vfloat roughn
     lobe->alpha_x = lobe->alpha_y = vf_square(roughness);
     trc_facets_finish(c, lobe, false);
     const vfloat quarter = vf_set(0.25f) * coat;
-    set_blend(c, lobe, v3_splat(vf_set(CLEARCOAT_F0) * quarter), v3_splat(quarter));
+    set_overshoot(c, lobe, v3_splat(vf_set(CLEARCOAT_F0) * quarter), v3_splat(quarter));
 }

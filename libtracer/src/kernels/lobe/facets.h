@@ -65,6 +65,8 @@ TRC_INLINE bool meet(const struct trc_lobe *lobe, vvec3 wo, vvec3 wi, struct mee
 TRC_INLINE vvec3 facet_reflectance(const struct trc_lobe *lobe, vfloat cos_m) {
     if (lobe->fresnel == TRC_FRESNEL_BLEND)
         return v3_lerp(lobe->f0, lobe->f90, trc_fresnel_blend(cos_m, lobe->ior));
+    if (lobe->fresnel == TRC_FRESNEL_OVERSHOOT)
+        return v3_lerp(lobe->f0, lobe->f90, trc_fresnel_overshoot(cos_m, lobe->ior));
     if (lobe->fresnel >= TRC_FRESNEL_OWN)
         return lobe->reflectance(lobe, cos_m);
     if (lobe->fresnel == TRC_FRESNEL_DIELECTRIC)
@@ -160,13 +162,14 @@ TRC_INLINE struct trc_fresnel blend_to_white(vvec3 f0) {
     return (struct trc_fresnel){.kind = TRC_FRESNEL_BLEND, .f0 = f0, .f90 = v3_splat(vf_one())};
 }
 
-/* Turns a lobe into one that goes from f0 at normal incidence to f90, and accounts for it in the
- * chance. */
-TRC_INLINE void set_blend(const struct trc_setup *c, struct trc_lobe *lobe, vvec3 f0, vvec3 f90) {
-    lobe->fresnel = TRC_FRESNEL_BLEND;
+/* Turns a lobe into one of Blender 3.4 that goes from f0 at normal incidence to f90, and accounts
+ * for it in the chance. */
+TRC_INLINE void set_overshoot(const struct trc_setup *c, struct trc_lobe *lobe, vvec3 f0,
+                              vvec3 f90) {
+    lobe->fresnel = TRC_FRESNEL_OVERSHOOT;
     lobe->f0 = f0;
     lobe->f90 = f90;
-    const vfloat blend = trc_fresnel_blend(v3_dot(lobe->n, c->s->wo), lobe->ior);
+    const vfloat blend = trc_fresnel_overshoot(v3_dot(lobe->n, c->s->wo), lobe->ior);
     lobe->mix_weight = lobe->mix_weight * v3_average(v3_lerp(f0, f90, blend));
 }
 

@@ -11,8 +11,7 @@
  * off by at most 0.001 of reflection and of glass from outside, 0.0025 from inside.
  *
  * Tables of shares have rows and columns by square roots too; slices of the first by the square
- * root of the same, of the second by sqrt((ior - 1) / (ior + 1)) up to TRC_SHARE_REACH, an ior of
- * 4.6.
+ * root of the same, of the second by sqrt((ior - 1) / (ior + 1)).
  *
  * Model of the missing energy: C. Kulla and A. Conty, "Revisiting Physically Based Shading at
  * Imageworks" (2017). */
@@ -182,7 +181,7 @@ TRC_INLINE vfloat trc_dielectric_share(vfloat cos_theta, vfloat alpha, vfloat io
     const vfloat depth = vf_safe_sqrt(vf_abs((ior - vf_one()) / (ior + vf_one())));
     const vint column = trc_grid_cell(vf_safe_sqrt(cos_theta), TRC_SHARE_COLUMNS, &x);
     const vint row = trc_grid_cell(vf_safe_sqrt(alpha), TRC_SHARE_ROWS, &y);
-    const vint slice = trc_grid_cell(depth * vf_set(1.0f / TRC_SHARE_REACH), TRC_SHARE_SLICES, &z);
+    const vint slice = trc_grid_cell(depth, TRC_SHARE_SLICES, &z);
     const vint at = (slice * vi_set(TRC_SHARE_ROWS) + row) * vi_set(TRC_SHARE_COLUMNS) + column;
     const float *table = trc_dielectric_share_table;
     const int columns = TRC_SHARE_COLUMNS, step = TRC_SHARE_ROWS * columns;

@@ -145,13 +145,6 @@ static void correlate(struct trc_lobe *lobe, const struct trc_fresnel *fresnel, 
     lobe->mix_weight = lobe->mix_weight * kept;
 }
 
-/* The factor of the lobe's normal; a blend never leaves its ends. */
-static vvec3 smooth_reflectance(const struct trc_lobe *lobe, vfloat cos_o) {
-    if (lobe->fresnel != TRC_FRESNEL_BLEND)
-        return facet_reflectance(lobe, cos_o);
-    return v3_lerp(lobe->f0, lobe->f90, vf_saturate(trc_fresnel_blend(cos_o, lobe->ior)));
-}
-
 /* What all bounces between facets keep of a colour after its first: each takes what refraction does
  * or, where nothing is refracted, what reflection does. kept: what the first lets out. */
 static vvec3 coloured_again(vvec3 reflected, vvec3 refracted, const struct trc_fresnel *fresnel,
@@ -190,7 +183,7 @@ void trc_add_correlated_glass(struct trc_setup *c, vvec3 weight, vvec3 reflected
         correlate(refract, fresnel, kept);
     const struct trc_lobe *either = reflect ? reflect : refract;
     if (either)
-        share_chances(reflect, refract, v3_average(smooth_reflectance(either, cos_o)));
+        share_chances(reflect, refract, v3_average(facet_reflectance(either, cos_o)));
 }
 
 /* Cycles refracts at least 1e-4, and so gives that much more than it gets. */

@@ -34,10 +34,16 @@ TRC_INLINE vfloat trc_fresnel_dielectric(vfloat cos_i, vfloat eta) {
 TRC_INLINE vfloat trc_fresnel_normal(vfloat eta) {
     return vf_square((eta - vf_one()) / (eta + vf_one()));
 }
-/* (F(cos) - F(1)) / (1 - F(1)): how far a Principled reflection is from its F0 colour. */
-TRC_INLINE vfloat trc_fresnel_blend(vfloat cos_i, vfloat eta) {
+/* (F(cos) - F(1)) / (1 - F(1)): how far a reflection of Principled in Blender 3.4 is from its F0
+ * colour. Below 0 for an index above 2 + sqrt(3), of which less is reflected before the edge than
+ * head-on. */
+TRC_INLINE vfloat trc_fresnel_overshoot(vfloat cos_i, vfloat eta) {
     const vfloat f0 = trc_fresnel_normal(eta);
     return (trc_fresnel_dielectric(cos_i, eta) - f0) / (vf_one() - f0);
+}
+/* The same of Blender 4. */
+TRC_INLINE vfloat trc_fresnel_blend(vfloat cos_i, vfloat eta) {
+    return vf_saturate(trc_fresnel_overshoot(cos_i, eta));
 }
 TRC_INLINE vfloat trc_schlick_weight(vfloat u) {
     const vfloat m = vf_saturate(vf_one() - u), m2 = m * m;

@@ -77,7 +77,7 @@ static void principled_specular(struct trc_setup *c, const struct trc_leaf *leaf
                           vm_any(vm_and(c->s->active, vf_gt(roughness, vf_set(MULTIPLE_FROM))));
     lobe->distribution = multiple ? TRC_LOBE_MULTI_GGX : TRC_LOBE_GGX;
     trc_facets_finish(c, lobe, false);
-    set_blend(c, lobe, f0, v3_splat(vf_one()));
+    set_overshoot(c, lobe, f0, v3_splat(vf_one()));
     if (multiple)
         trc_facets_set_multiple(lobe, c->s->wo,
                                 v3_lerp(f0, v3_splat(vf_one()), mean_blend(lobe->ior)), true);
@@ -94,15 +94,15 @@ static void principled_glass(struct trc_setup *c, const struct trc_leaf *leaf, v
     if (leaf->mode == TRC_DISTRIBUTION_MULTI_GGX &&
         vm_any(vm_and(c->s->active, vf_gt(roughness, vf_set(MULTIPLE_GLASS_FROM))))) {
         const vfloat blend = trc_fresnel_blend(v3_dot(n, c->s->wo), eta);
-        trc_add_multi_glass(c, glass, v3_lerp(f0, v3_splat(vf_one()), vf_saturate(blend)),
-                            v3_saturate(base), glass, n, alpha, eta);
+        trc_add_multi_glass(c, glass, v3_lerp(f0, v3_splat(vf_one()), blend), v3_saturate(base),
+                            glass, n, alpha, eta);
         return;
     }
     const vfloat f = trc_reflected_part(trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta));
     struct trc_lobe *lobe = trc_add_dielectric(c, TRC_LOBE_REFLECT, v3_scale(glass, f), n, alpha,
                                                eta, TRC_DISTRIBUTION_GGX);
     if (lobe)
-        set_blend(c, lobe, f0, v3_splat(vf_one()));
+        set_overshoot(c, lobe, f0, v3_splat(vf_one()));
     vfloat through = roughness;
     if (leaf->mode != TRC_DISTRIBUTION_MULTI_GGX)
         through =
