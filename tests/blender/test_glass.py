@@ -164,7 +164,7 @@ def inside_balls_before_a_lamp():
 
 
 def test_balls_before_a_lamp(blender):
-    """How far README says they are off."""
+    """How far addon/differences.md says they are off."""
     found, version = blender.run(inside_balls_before_a_lamp)
     for roughness, ratio in found.items():
         print(f"roughness {roughness}: {ratio:.3f}")
