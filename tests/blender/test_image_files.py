@@ -169,13 +169,17 @@ def test_files_that_are_written_again(blender):
     assert np.abs(before[1] - after[1]).max() > 0.1
 
 
-def inside_read_beside_meshes():
+def inside_read_beside_meshes(is_packed):
     """The calls of a render that make meshes, and that ask for a file and wait for it."""
+    import contextlib
+    from unittest import mock
+    import bpy
     import scenes
     import volley.native
     _stage(lambda: _noise_file(64))
+    if is_packed:
+        bpy.data.images["large.png"].pack()
     calls = []
-    names = ("expect_image", "create_mesh", "update_image", "commit")
 
     def noted(name):
         method = getattr(volley.native.Scene, name)
@@ -184,15 +188,50 @@ def inside_read_beside_meshes():
             calls.append(name)
             return method(*arguments, **values)
         return call
-    for name in names:
-        setattr(volley.native.Scene, name, noted(name))
-    return calls, scenes.render()
+    with contextlib.ExitStack() as changes:
+        for name in ("expect_image", "create_mesh", "update_image", "commit"):
+            changes.enter_context(mock.patch.object(volley.native.Scene, name, noted(name)))
+        return calls, scenes.render()
 
 
-def test_files_are_read_while_meshes_are(blender):
-    calls, picture = blender.run(inside_read_beside_meshes)
+@pytest.mark.parametrize("is_packed", [False, True], ids=["file", "packed"])
+def test_files_are_read_while_meshes_are(blender, is_packed):
+    calls, picture = blender.run(inside_read_beside_meshes, is_packed)
     assert calls == ["expect_image", "create_mesh", "update_image", "commit"]
     assert picture[..., :3].std() > 0.05
+
+
+def inside_full_disk():
+    """Pictures of packed images that are copied, that are read one by one, and that cannot be copied, and copies that
+    are left."""
+    import tempfile
+    from unittest import mock
+    import bpy
+    import scenes
+    from volley.sync import image
+    wall = _stage(lambda: _noise_file(64))
+    bpy.data.images["large.png"].pack()
+    second = bpy.data.images.new("Second", 16, 16)
+    second.pack()
+    tree = wall.data.materials[0].node_tree
+    shown, node = tree.nodes["Image Texture"], tree.nodes.new("ShaderNodeTexImage")
+    node.image = second
+    added = tree.nodes.new("ShaderNodeVectorMath")
+    tree.links.new(shown.outputs["Color"], added.inputs[0])
+    tree.links.new(node.outputs["Color"], added.inputs[1])
+    tree.links.new(added.outputs[0], next(n for n in tree.nodes if n.type == 'EMISSION').inputs["Color"])
+    pictures, folder = [], tempfile.mkdtemp()
+    for changes in ({}, {"_MAX_COPIED_BYTES": 0}, {"_write_copy": mock.Mock(side_effect=OSError("full"))}):
+        with mock.patch.object(tempfile, "tempdir", folder), mock.patch.dict(vars(image), changes):
+            pictures.append(scenes.render())
+    return pictures, [name for name in os.listdir(folder) if not name.startswith("volley_")]  # but for pictures
+
+
+def test_packed_files_where_there_is_no_room(blender):
+    pictures, left = blender.run(inside_full_disk)
+    assert pictures[0][..., :3].std() > 0.05
+    assert (pictures[1] == pictures[0]).all() and np.abs(pictures[2] - pictures[0]).max() < 0.01
+    assert not left and "magenta" not in blender.output
 
 
 def inside_lost():

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Images: files by their path, everything else by its pixels.
 
-Plain and packed files are read by the library itself. Generated and painted images, frames of movies, and
+Plain and packed files are read by the library itself, packed ones from copies. Generated and painted images, frames of movies, and
 files in formats that the library does not know, or any where it has no OpenImageIO, come from Blender's
 pixels. An image that is missing, damaged, too large or whatever else is 0, which renders magenta, with one
 warning; it never costs the render. Files are read while meshes are: their images have no contents before
@@ -29,14 +29,15 @@ _ALPHA_MODES = {'STRAIGHT': abi.AlphaMode.STRAIGHT, 'PREMUL': abi.AlphaMode.PREM
 _ANIMATED_SOURCES = {'SEQUENCE', 'MOVIE'}
 _FILE_SOURCES = {'FILE', 'SEQUENCE', 'TILED'}
 _MAX_NUMBERS = (1 << 31) - 1  # of pixels that Blender's Python can count
+_MAX_COPIED_BYTES = 1 << 30    # of packed files that wait on the disk to be read
 
 _FIRST_TILE, _TILES_PER_ROW = 1001, 10  # UDIM
 
 
 @dataclass(frozen=True)
 class _Wanted:
-    """What the library's image of that id is to show; path: of a file, "" for what is in the .blend; tile: the
-    number of one of a tiled image that is packed."""
+    """What the library's image of that id is to show; path: of a file or of a packed one's copy, "" for Blender's
+    pixels; tile: the number of one of a tiled image that is packed."""
 
     image: bpy.types.Image
     path: str
@@ -53,6 +54,7 @@ class Images:
         self._scene, self._warnings = scene, warnings
         self._entries = {}  # key -> (signature, id)
         self._empty = {}    # key -> _Wanted, of files that are being read
+        self._copies, self._copied_bytes = None, 0  # folder of packed files among them
         self._seen = set()
         self._look_again = True
         self._limit = 0
@@ -119,12 +121,14 @@ class Images:
             return known[1]
         created = self._scene.create_image(is_mip_mapped=is_mip_mapped)
         self._entries[key] = (signature, created)
-        wanted = _Wanted(image, path, is_mip_mapped, tile, created, image.name)
-        if path:
-            self._scene.expect_image(**self._file_values(wanted, path), **_encoding(image))
+        wanted = _Wanted(image, path or self._copy(image, tile), is_mip_mapped, tile, created, image.name)
+        if wanted.path:
+            self._scene.expect_image(**self._file_values(wanted, wanted.path), **_encoding(image))
             self._empty[key] = wanted
         else:
             self._fill(wanted)
+        if self._copied_bytes > _MAX_COPIED_BYTES:
+            self._fill_waiting()
         if known:
             self._scene.destroy_image(known[1])
         return created
@@ -173,8 +177,29 @@ class Images:
             self._empty.pop(key, None)
             if image_id:
                 self._scene.destroy_image(image_id)
+        self._fill_waiting()
+
+    def _copy(self, image, tile):
+        """The path of a copy of an image's packed file, until that is read; "" where there is none, or the library does
+        not read it as Blender does."""
+        packed = _packed_file(image, tile)
+        data = packed.data if packed else b""
+        if not data or not _is_read_alike(image, data):
+            return ""
+        if self._copies is None:
+            self._copies = tempfile.TemporaryDirectory()
+        self._copied_bytes += len(data)
+        try:
+            return _write_copy(image, tile, data, tempfile.mkdtemp(dir=self._copies.name))
+        except OSError:  # Blender's pixels serve
+            return ""
+
+    def _fill_waiting(self):
         while self._empty:
             self._fill(self._empty.pop(next(iter(self._empty))))
+        if self._copies is not None:
+            self._copies.cleanup()
+        self._copies, self._copied_bytes = None, 0
 
     def _fill(self, wanted):
         """Give an image its contents; it stays magenta, with a warning, where that cannot be."""
@@ -188,18 +213,12 @@ class Images:
             self._warnings.add(f"Image '{wanted.name}': {error or 'no memory'}; magenta is used")
 
     def _fill_from_blend(self, wanted):
-        image, tile = wanted.image, wanted.tile
-        packed = _packed_file(image, tile)
-        is_alike = packed and _is_read_alike(image, packed.data)
-        if not packed or (tile is None and not is_alike):
-            self._fill_from_pixels(wanted, image)
+        packed = None if wanted.tile is None else _packed_file(wanted.image, wanted.tile)
+        if packed is None:
+            self._fill_from_pixels(wanted, wanted.image)
             return
         with tempfile.TemporaryDirectory() as folder:
-            name = os.path.basename(image.filepath if tile is None else tile_path(image, tile))
-            path = os.path.join(folder, name or image.name)
-            with open(path, "wb") as file:
-                file.write(packed.data)
-            (self._fill_from_file if is_alike else self._fill_as_blender_reads)(wanted, path)
+            self._fill_as_blender_reads(wanted, _write_copy(wanted.image, wanted.tile, packed.data, folder))
 
     def _fill_from_file(self, wanted, path):
         """As the library reads it, or as Blender does where the library cannot."""
@@ -421,6 +440,15 @@ def _packed_file(image, tile=None):
     if image.source == 'TILED':
         return next((each.packed_file for each in image.packed_files if each.tile_number == tile), None)
     return image.packed_file if image.source == 'FILE' else None
+
+
+def _write_copy(image, tile, data, folder):
+    """The path of a packed file, or of that of a tile, written into a folder under its own name."""
+    name = os.path.basename(image.filepath if tile is None else tile_path(image, tile))
+    path = os.path.join(folder, name or image.name)
+    with open(path, "wb") as file:
+        file.write(data)
+    return path
 
 
 def _is_read_alike(image, data):
