@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Images: files by their path, everything else by its pixels.
 
-Plain and packed files are read by the library itself, packed ones from copies. Generated and painted images, frames of movies, and
-files in formats that the library does not know, or any where it has no OpenImageIO, come from Blender's
-pixels. An image that is missing, damaged, too large or whatever else is 0, which renders magenta, with one
-warning; it never costs the render. Files are read while meshes are: their images have no contents before
-the end of a sync.
+Plain and packed files are read by the library itself, packed ones from copies. Generated and painted images, frames of
+movies, and files in formats that the library does not know, or any where it has no OpenImageIO, come from Blender's
+pixels. An image that is missing, damaged, too large or whatever else stays without contents, which renders magenta,
+with one warning; it never costs the render. Files are read while meshes are, and waited for at the end of a sync.
 Colours are converted to scene-linear ones by the library, with Blender's OpenColorIO configuration.
 """
 
@@ -186,15 +185,16 @@ class Images:
         data = packed.data if packed else b""
         if not data or not _is_read_alike(image, data):
             return ""
-        if self._copies is None:
-            self._copies = tempfile.TemporaryDirectory()
         self._copied_bytes += len(data)
         try:
+            if self._copies is None:
+                self._copies = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
             return _write_copy(image, tile, data, tempfile.mkdtemp(dir=self._copies.name))
         except OSError:  # Blender's pixels serve
             return ""
 
     def _fill_waiting(self):
+        """Wait for the files that are being read."""
         while self._empty:
             self._fill(self._empty.pop(next(iter(self._empty))))
         if self._copies is not None:
@@ -213,6 +213,7 @@ class Images:
             self._warnings.add(f"Image '{wanted.name}': {error or 'no memory'}; magenta is used")
 
     def _fill_from_blend(self, wanted):
+        """From the pixels that Blender has, of a packed tile from those that it reads."""
         packed = None if wanted.tile is None else _packed_file(wanted.image, wanted.tile)
         if packed is None:
             self._fill_from_pixels(wanted, wanted.image)
