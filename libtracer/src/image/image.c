@@ -171,27 +171,33 @@ static void set_opaque(struct trc_image *image, uint64_t count) {
     }
 }
 
-/* Colours times alpha, in the encoding of the file and rounded down for bytes, as Cycles. */
+/* Colours times alpha, in the encoding of the file and rounded down for bytes, as Cycles. Most
+ * texels are opaque. */
 static void multiply_by_alpha(struct trc_image *image, uint64_t count) {
     uint8_t *b = image->levels[0].texels;
     uint16_t *h = image->levels[0].texels;
     float *f = image->levels[0].texels;
-    for (uint64_t i = 0; i < count; i++, b += 4, h += 4, f += 4) {
-        for (int c = 0; c < 3; c++) {
-            switch (image->format) {
-            case TRC_TEXEL_U8:
-                b[c] = (uint8_t)(b[c] * b[3] / UINT8_MAX);
-                break;
-            case TRC_TEXEL_U16:
-                h[c] = (uint16_t)((uint32_t)h[c] * h[3] / UINT16_MAX);
-                break;
-            case TRC_TEXEL_F16:
-                h[c] = trc_float_to_half(trc_half_to_float(h[c]) * trc_half_to_float(h[3]));
-                break;
-            case TRC_TEXEL_F32:
-                f[c] *= f[3];
-                break;
-            }
+    for (uint64_t i = 0; i < 4 * count; i += 4) {
+        switch (image->format) {
+        case TRC_TEXEL_U8:
+            if (b[i + 3] != UINT8_MAX)
+                for (uint64_t c = i; c < i + 3; c++)
+                    b[c] = (uint8_t)(b[c] * b[i + 3] / UINT8_MAX);
+            break;
+        case TRC_TEXEL_U16:
+            if (h[i + 3] != UINT16_MAX)
+                for (uint64_t c = i; c < i + 3; c++)
+                    h[c] = (uint16_t)((uint32_t)h[c] * h[i + 3] / UINT16_MAX);
+            break;
+        case TRC_TEXEL_F16:
+            if (h[i + 3] != TRC_HALF_ONE)
+                for (uint64_t c = i; c < i + 3; c++)
+                    h[c] = trc_float_to_half(trc_half_to_float(h[c]) * trc_half_to_float(h[i + 3]));
+            break;
+        case TRC_TEXEL_F32:
+            for (uint64_t c = i; c < i + 3; c++)
+                f[c] *= f[i + 3];
+            break;
         }
     }
 }
