@@ -317,7 +317,7 @@ SCENES = {
        for name, (prepare, shutter) in effect_scenes.SCENES.items()},
     **{name: Scene(None, prepare, 320, 240, shutter=shutter)
        for name, (prepare, shutter) in hair_scenes.SCENES.items()},
-    **{name: Scene(source, prepare, 320, 240, shutter=shutter)
+    **{name: Scene(source, prepare, 160, 120, shutter=shutter)
        for name, (prepare, shutter, source) in large_scenes.SCENES.items()},
 }
 
