@@ -3,6 +3,7 @@
 
 #include "core/checks.h"
 #include "core/core.h"
+#include "image/image.h"
 #include "scene/scene.h"
 #include "tracer/tracer.h"
 
@@ -92,7 +93,7 @@ static trc_status check_image(const trc_image_desc *desc) {
     TRC_TRY(trc_check_enum(desc->is_alpha_literal, 2, "is_alpha_literal"));
     if (desc->path && desc->pixels)
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "an image has either pixels or a path");
-    if (desc->path || (!desc->pixels && !desc->width && !desc->height))
+    if (desc->path || trc_image_desc_is_empty(desc))
         return TRC_OK;
     TRC_TRY(trc_check_enum(desc->is_float, 2, "is_float"));
     return check_pixels(desc);

@@ -441,7 +441,7 @@ trc_status trc_image_load(const trc_image_desc *desc, const struct trc_image_sou
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT,
                         "a colour space needs a configuration, and is not sRGB");
     }
-    if (!desc->path && !desc->pixels && !desc->width && !desc->height)
+    if (trc_image_desc_is_empty(desc))
         return make_empty(desc, image_out);
     struct trc_image *image = NULL;
     TRC_TRY(desc->path ? load_file(desc, source, &image) : load_pixels(desc, source, &image));

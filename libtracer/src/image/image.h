@@ -21,6 +21,11 @@ struct trc_image_source {
 trc_status trc_image_load(const trc_image_desc *desc, const struct trc_image_source *source,
                           struct trc_image **image_out);
 
+/* Whether a descriptor is that of an image without contents. */
+static inline bool trc_image_desc_is_empty(const trc_image_desc *desc) {
+    return !desc->path && !desc->pixels && !desc->width && !desc->height;
+}
+
 /* TOO_LARGE for an image of such a size and enum trc_texel, with a message that names it. name: ""
  * or the path of a file. */
 trc_status trc_image_check_size(uint32_t width, uint32_t height, uint32_t format, const char *name);
