@@ -220,6 +220,18 @@ static void take_ideal(const struct trc_lobes *l, const struct trc_lobe *lobe,
     out->valid = vm_or(out->valid, vm_and(m, vf_gt(v3_max(v3_abs(weight)), vf_zero())));
 }
 
+/* Waiting lanes that choose the twin of a lobe, which samples for both; rest: what the lobe leaves
+ * of their numbers; is_last: nothing is chosen after the twin. */
+TRC_INLINE vmask twin_lanes(const struct trc_lobe *lobe, vmask waiting, vfloat rest, bool is_last) {
+    if (!lobe->has_twin)
+        return vm_none();
+    const struct trc_lobe *twin = lobe + 1;
+    vmask m = vm_and(waiting, vf_gt(twin->sample_weight, vf_zero()));
+    if (!is_last)
+        m = vm_and(m, vf_lt(rest, twin->sample_weight));
+    return vm_andnot(m, vm_or(lobe->ideal, twin->ideal));
+}
+
 TRC_INLINE void sample_lobes(const struct trc_lobes *l, const struct trc_surface *s, vfloat u_lobe,
                              vfloat u1, vfloat u2, bool rare, struct trc_bsdf_sample *out) {
     clear_sample(out);
@@ -240,12 +252,17 @@ TRC_INLINE void sample_lobes(const struct trc_lobes *l, const struct trc_surface
         vmask m = vm_and(waiting, vf_gt(lobe->sample_weight, vf_zero()));
         if (i != last)
             m = vm_and(m, vf_lt(rest, lobe->sample_weight));
-        const vfloat chosen_at = rest;
+        const vfloat before = rest;
         rest = rest - lobe->sample_weight;
         waiting = vm_andnot(waiting, m);
+        const vmask exact = vm_and(m, lobe->ideal);
+        const vmask twin = twin_lanes(lobe, waiting, rest, i + 1 == last);
+        waiting = vm_andnot(waiting, twin);
+        m = vm_or(m, twin);
         if (!vm_any(m))
             continue;
-        const vmask exact = vm_and(m, lobe->ideal), spread = vm_andnot(m, lobe->ideal);
+        const vfloat chosen_at = vf_select(twin, rest, before);
+        const vmask spread = vm_andnot(m, exact);
         if (lobe->kind != TRC_LOBE_REFLECT && lobe->kind != TRC_LOBE_TRANSPARENT)
             out->transmitted = vm_or(out->transmitted, exact);
         /* Reflection, too: of a pair either may cross the surface. */
@@ -258,7 +275,7 @@ TRC_INLINE void sample_lobes(const struct trc_lobes *l, const struct trc_surface
         if (vm_any(exact))
             take_ideal(l, lobe, s, exact, lobe->sample_weight / l->continue_weight, out);
         if (vm_any(spread)) {
-            vmask alive = spread, crosses;
+            vmask alive = spread, crosses = twin;
             const vvec3 wi =
                 v3_normalize(lobe->model->direction(lobe, s, u1, u2, chosen_at, &alive, &crosses));
             out->wi = v3_select(spread, wi, out->wi);
@@ -271,7 +288,7 @@ TRC_INLINE void sample_lobes(const struct trc_lobes *l, const struct trc_surface
             if (rare) {
                 if (lobe->kind == TRC_LOBE_HAIR_REFLECT)
                     out->fibre = vm_or(out->fibre, spread);
-                chosen = vi_select(spread, vi_set(i), chosen);
+                chosen = vi_select(spread, vi_select(twin, vi_set(i + 1), vi_set(i)), chosen);
                 draw.chosen_at = vf_select(spread, chosen_at, draw.chosen_at);
             }
         }

@@ -76,6 +76,7 @@ struct trc_lobe {
     vfloat cos_o;         /* n . wo */
     vfloat g1_o;          /* masking of wo */
     vfloat pdf_scale;     /* density of a sampled direction over D of its half vector */
+    bool has_twin;        /* of glass: the next lobe refracts by the same micro-normals */
     vmask paired;         /* lanes of glass in which the sampled micro-normal decides between this
                              lobe and its other half, each of which has half of the chance */
     vfloat pair_tint;     /* mean colour of refraction over that of reflection, paired lanes */

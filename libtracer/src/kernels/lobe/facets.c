@@ -4,7 +4,8 @@
 vvec3 trc_facets_direction(const struct trc_lobe *lobe, const struct trc_surface *s, vfloat u1,
                            vfloat u2, vfloat chosen_at, vmask *alive, vmask *crosses) {
     vvec3 a, b;
-    *crosses = lobe->kind == TRC_LOBE_REFLECT ? vm_none() : *alive;
+    if (lobe->kind != TRC_LOBE_REFLECT)
+        *crosses = *alive;
     if (lobe->anisotropic) {
         a = lobe->tangent;
         b = v3_cross(lobe->n, a);
@@ -29,7 +30,8 @@ vvec3 trc_facets_direction(const struct trc_lobe *lobe, const struct trc_surface
     } else {
         vfloat bound = vf_one();
         if (lobe->kind == TRC_LOBE_REFLECT)
-            bound = vf_select(lobe->paired, bound, trc_ggx_bound(lobe->cos_o, ax, ay));
+            bound =
+                vf_select(vm_or(lobe->paired, *crosses), bound, trc_ggx_bound(lobe->cos_o, ax, ay));
         m = trc_ggx_sample(wo, ax, ay, bound, u, u2);
     }
     if (vm_any(lobe->paired)) {
@@ -52,6 +54,27 @@ vvec3 trc_facets_direction(const struct trc_lobe *lobe, const struct trc_surface
     return v3_from_frame(wi, a, b, lobe->n);
 }
 
+/* Lanes that scatter into one direction. */
+static void set_ideal(struct trc_lobe *lobe) {
+    const vfloat ax = lobe->alpha_x, ay = lobe->alpha_y;
+    lobe->ideal = lobe->distribution == TRC_LOBE_ASHIKHMIN
+                      ? vf_le(vf_max(ax, ay), vf_set(MIN_ALPHA))
+                      : vf_le(ax * ay, vf_set(TRC_SINGULAR_ALPHA2));
+    if (lobe->kind == TRC_LOBE_REFRACT)
+        lobe->ideal =
+            vm_or(lobe->ideal, vf_lt(vf_abs(lobe->ior - vf_one()), vf_set(NO_REFRACTION)));
+}
+
+/* Density of a direction over D of its half vector, of GGX. */
+static vfloat ggx_pdf_scale(const struct trc_lobe *lobe) {
+    const vfloat cos_o = vf_max(lobe->cos_o, vf_set(MIN_COSINE));
+    const vfloat whole = vf_set(2.0f) / lobe->g1_o;
+    const vfloat bound = lobe->kind == TRC_LOBE_REFLECT
+                             ? trc_ggx_bound(cos_o, lobe->alpha_x, lobe->alpha_y)
+                             : vf_one();
+    return vf_set(0.5f) / (cos_o * (bound + whole - vf_one()));
+}
+
 void trc_facets_finish(const struct trc_setup *c, struct trc_lobe *lobe, bool is_sharp) {
     const vfloat minimum =
         vf_set(lobe->distribution == TRC_LOBE_ASHIKHMIN || lobe->distribution == TRC_LOBE_MULTI_GGX
@@ -67,12 +90,7 @@ void trc_facets_finish(const struct trc_setup *c, struct trc_lobe *lobe, bool is
         lobe->alpha_y = vf_max(y, c->filter_alpha);
     }
     const vfloat ax = lobe->alpha_x, ay = lobe->alpha_y;
-    lobe->ideal = lobe->distribution == TRC_LOBE_ASHIKHMIN
-                      ? vf_le(vf_max(ax, ay), vf_set(MIN_ALPHA))
-                      : vf_le(ax * ay, vf_set(TRC_SINGULAR_ALPHA2));
-    if (lobe->kind == TRC_LOBE_REFRACT)
-        lobe->ideal =
-            vm_or(lobe->ideal, vf_lt(vf_abs(lobe->ior - vf_one()), vf_set(NO_REFRACTION)));
+    set_ideal(lobe);
     const vfloat cos_o = vf_max(v3_dot(lobe->n, c->s->wo), vf_set(MIN_COSINE));
     /* Densities and values have to agree about it. */
     lobe->cos_o =
@@ -90,9 +108,19 @@ void trc_facets_finish(const struct trc_setup *c, struct trc_lobe *lobe, bool is
         return;
     }
     lobe->g1_o = trc_ggx_g1(tan2);
-    const vfloat whole = vf_set(2.0f) / lobe->g1_o;
-    const vfloat bound = lobe->kind == TRC_LOBE_REFLECT ? trc_ggx_bound(cos_o, ax, ay) : vf_one();
-    lobe->pdf_scale = vf_set(0.5f) / (cos_o * (bound + whole - vf_one()));
+    lobe->pdf_scale = ggx_pdf_scale(lobe);
+}
+
+void trc_facets_finish_twin(struct trc_lobe *lobe, const struct trc_lobe *of) {
+    lobe->alpha_x = of->alpha_x;
+    lobe->alpha_y = of->alpha_y;
+    lobe->mean_alpha = of->mean_alpha;
+    lobe->cos_o = of->cos_o;
+    lobe->g1_o = of->g1_o;
+    lobe->pdf_scale = of->pdf_scale;
+    set_ideal(lobe);
+    if (lobe->distribution != TRC_LOBE_BECKMANN)
+        lobe->pdf_scale = ggx_pdf_scale(lobe);
 }
 
 void trc_facets_set_multiple(struct trc_lobe *lobe, vvec3 wo, vvec3 per_bounce, bool is_first) {

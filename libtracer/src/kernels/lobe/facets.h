@@ -208,6 +208,9 @@ struct lobe_value trc_reflection_value(const struct trc_lobe *lobe, const struct
 /* What reflection and refraction need once alpha, ior and tangent are set. */
 void trc_facets_finish(const struct trc_setup *c, struct trc_lobe *lobe, bool is_sharp);
 
+/* The same of the twin of a lobe that is set up: it has the normal, distribution and alpha. */
+void trc_facets_finish_twin(struct trc_lobe *lobe, const struct trc_lobe *of);
+
 /* The lobe of the light that scatters more than once; per_bounce: colour of every bounce, the first
  * included where is_first (the Fresnel factor), else the first is in the weight already. Of an
  * anisotropic surface it has all that is missing, in the shape of the isotropic one of the same

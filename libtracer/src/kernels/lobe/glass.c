@@ -49,8 +49,9 @@ vfloat trc_ior_above(const struct trc_setup *c, vfloat ior) {
     return vf_select(c->s->backfacing, vf_max(ior, vf_set(TRC_MIN_IOR)), vf_one());
 }
 
-struct trc_lobe *trc_add_dielectric(struct trc_setup *c, enum trc_lobe_kind kind, vvec3 weight,
-                                    vvec3 n, vfloat alpha, vfloat eta, uint32_t mode) {
+/* A lobe of glass without its alpha. */
+static struct trc_lobe *start_dielectric(struct trc_setup *c, enum trc_lobe_kind kind, vvec3 weight,
+                                         vvec3 n, vfloat eta, uint32_t mode) {
     static const struct trc_lobe_model refraction = {.kind = TRC_LOBE_REFRACT,
                                                      .has_facets = true,
                                                      .value = refraction_value,
@@ -63,9 +64,31 @@ struct trc_lobe *trc_add_dielectric(struct trc_setup *c, enum trc_lobe_kind kind
     lobe->distribution = distribution == TRC_LOBE_BECKMANN ? TRC_LOBE_BECKMANN : TRC_LOBE_GGX;
     lobe->correlated = mode & TRC_DISTRIBUTION_CORRELATED;
     lobe->n = n;
-    lobe->alpha_x = lobe->alpha_y = alpha;
     lobe->ior = eta;
+    return lobe;
+}
+
+struct trc_lobe *trc_add_dielectric(struct trc_setup *c, enum trc_lobe_kind kind, vvec3 weight,
+                                    vvec3 n, vfloat alpha, vfloat eta, uint32_t mode) {
+    struct trc_lobe *lobe = start_dielectric(c, kind, weight, n, eta, mode);
+    if (!lobe)
+        return NULL;
+    lobe->alpha_x = lobe->alpha_y = alpha;
     trc_facets_finish(c, lobe, is_sharp(mode));
+    return lobe;
+}
+
+/* What refracts as the twin of a lobe that reflects and was added last, or alone where that is
+ * NULL; all but the weight is the same of both. */
+static struct trc_lobe *add_twin(struct trc_setup *c, struct trc_lobe *reflect, vvec3 weight,
+                                 vvec3 n, vfloat alpha, vfloat eta, uint32_t mode) {
+    if (!reflect)
+        return trc_add_dielectric(c, TRC_LOBE_REFRACT, weight, n, alpha, eta, mode);
+    struct trc_lobe *lobe = start_dielectric(c, TRC_LOBE_REFRACT, weight, n, eta, mode);
+    if (!lobe)
+        return NULL;
+    trc_facets_finish_twin(lobe, reflect);
+    reflect->has_twin = true;
     return lobe;
 }
 
@@ -125,8 +148,8 @@ void trc_add_multi_glass(struct trc_setup *c, vvec3 weight, vvec3 reflected, vve
         reflect->is_whole_glass = true;
         reflect->f0 = v3_zero();
     }
-    struct trc_lobe *refract = trc_add_dielectric(c, TRC_LOBE_REFRACT, v3_mul(w, refracted), n,
-                                                  rough, eta, TRC_DISTRIBUTION_GGX);
+    struct trc_lobe *refract =
+        add_twin(c, reflect, v3_mul(w, refracted), n, rough, eta, TRC_DISTRIBUTION_GGX);
     if (refract) {
         refract->fresnel = TRC_FRESNEL_DIELECTRIC;
         refract->is_whole_glass = true;
@@ -177,8 +200,7 @@ void trc_add_correlated_glass(struct trc_setup *c, vvec3 weight, vvec3 reflected
         trc_add_dielectric(c, TRC_LOBE_REFLECT, reflected, n, alpha, eta, mode);
     if (reflect)
         correlate(reflect, fresnel, kept);
-    struct trc_lobe *refract =
-        trc_add_dielectric(c, TRC_LOBE_REFRACT, refracted, n, alpha, eta, mode);
+    struct trc_lobe *refract = add_twin(c, reflect, refracted, n, alpha, eta, mode);
     if (refract)
         correlate(refract, fresnel, kept);
     const struct trc_lobe *either = reflect ? reflect : refract;
@@ -213,9 +235,9 @@ static void add_glass(struct trc_setup *c, const struct trc_leaf *leaf, vfloat w
     }
     const vvec3 tint = v3_scale(color, weight);
     const vfloat f = trc_reflected_part(trc_fresnel_dielectric(v3_dot(n, c->s->wo), eta));
-    trc_add_dielectric(c, TRC_LOBE_REFLECT, v3_scale(tint, f), n, alpha, eta, leaf->mode);
-    trc_add_dielectric(c, TRC_LOBE_REFRACT, v3_scale(tint, vf_one() - f), n, alpha, eta,
-                       leaf->mode);
+    struct trc_lobe *reflect =
+        trc_add_dielectric(c, TRC_LOBE_REFLECT, v3_scale(tint, f), n, alpha, eta, leaf->mode);
+    add_twin(c, reflect, v3_scale(tint, vf_one() - f), n, alpha, eta, leaf->mode);
 }
 
 const struct trc_closure TRC_CLOSURE_OF(GLASS) = {.add = add_glass};

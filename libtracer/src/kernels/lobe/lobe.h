@@ -56,7 +56,7 @@ struct trc_lobe_model {
      * always ideal. chosen_at, evenly below its sample_weight, decides between paired lobes. Lanes
      * leave *alive where total reflection leaves none, or where it is on the wrong side: other
      * lobes may have a density there, but it was not theirs that was sampled. *crosses: lanes that
-     * are transmitted. */
+     * are transmitted; before, those in which the lobe's twin was chosen, whose direction it is. */
     vvec3 (*direction)(const struct trc_lobe *lobe, const struct trc_surface *s, vfloat u1,
                        vfloat u2, vfloat chosen_at, vmask *alive, vmask *crosses);
 };

@@ -76,7 +76,7 @@ struct trc_lobe *trc_add_lobe(struct trc_setup *c, const struct trc_lobe_model *
     lobe->correlated = lobe->is_whole_glass = false;
     lobe->facet_shadowing = c->material->flags & TRC_MATERIAL_FACET_SHADOWING;
     lobe->albedo_scale = vf_one();
-    lobe->anisotropic = false;
+    lobe->anisotropic = lobe->has_twin = false;
     lobe->ideal = lobe->paired = vm_none();
     lobe->weight = v3_where(counts, w);
     lobe->mix_weight = vf_where(counts, mean);

@@ -74,6 +74,7 @@
 #define trc_emission_surface(...) TRC_KERNEL(trc_emission_surface)(__VA_ARGS__)
 #define trc_facets_direction(...) TRC_KERNEL(trc_facets_direction)(__VA_ARGS__)
 #define trc_facets_finish(...) TRC_KERNEL(trc_facets_finish)(__VA_ARGS__)
+#define trc_facets_finish_twin(...) TRC_KERNEL(trc_facets_finish_twin)(__VA_ARGS__)
 #define trc_facets_gain(...) TRC_KERNEL(trc_facets_gain)(__VA_ARGS__)
 #define trc_facets_keep_energy(...) TRC_KERNEL(trc_facets_keep_energy)(__VA_ARGS__)
 #define trc_facets_set_multiple(...) TRC_KERNEL(trc_facets_set_multiple)(__VA_ARGS__)
