@@ -240,9 +240,12 @@ def test_parts_of_two_machines_are_told_apart():
     new = machine.of_part({"date": "2026-01-02", "commit": "b", "cpu": "Two", "processors": 4, "isa": "neon"})
     assert machine.names({"parts": {"frames": old, "blender": old, "kernels": new}}) == [
         "Two, 4 logical processors, neon", "One, 2 logical processors, avx2"]
-    assert document.where(new, {"parts": {"kernels": new}}) == ""
-    assert document.where(old, {"parts": {"frames": old, "kernels": new}}) == (
-        ", One, 2 logical processors, avx2")
+    assert document.period({"frames": old, "blender": old}) == "a" and not document.versions({"frames": old})
+    parts = {"frames": old, "blender": old, "kernels": new}
+    assert "2 commits of 2026-01-01 to 2026-01-02" in document.period(parts)
+    latest, former = document.versions(parts).splitlines()[-2:]
+    assert "b | Two" in latest and "| kernels |" in latest
+    assert "a | One" in former and "| frames; blender |" in former
 
 
 # FLIP --------------------------------------------------------------------------------------------

@@ -47,13 +47,8 @@ def text(results, out):
         parts.append(farm_section.text(results["farm"]))
     if results.get("again"):
         parts.append(repeated.section(results))
-    parts.append(pictures(out))
+    parts += [pictures(out), versions(results["machine"]["parts"])]
     return "\n\n".join(part for part in parts if part) + "\n"
-
-
-def where(made, described):
-    """The machine of a part, where not all were measured on one."""
-    return f", {made['machine']}" if len(names(described)) > 1 else ""
 
 
 def head(results):
@@ -67,8 +62,7 @@ def head(results):
         ["load before", str(machine["load_before"])],
         ["system", machine["system"]],
         ["compiler", machine["compiler"]],
-        ["Volley", ", ".join(f"{part} {made['commit']} ({made['date']}{where(made, machine)})"
-                             for part, made in machine["parts"].items())],
+        ["Volley", period(machine["parts"])],
         ["against", ", ".join(filter(None, (
             f"{machine['blender']} with Cycles",
             *(f"{run['blender']} with Cycles" for run in elsewhere.of_part(results, "curves")),
@@ -81,6 +75,26 @@ def head(results):
             "took turns; brackets hold least and most of the repeats, or, where a ratio is given, its "
             "95 % bootstrap interval over seeds and repeats. Losing cases come first, and bold.\n\n"
             + table(["", ""], rows))
+
+
+def period(parts):
+    """The commits of all parts: one, or how many of what time."""
+    commits = {made["commit"] for made in parts.values()}
+    dates = sorted(made["date"][:len("2000-01-01")] for made in parts.values())
+    return (", ".join(commits) if len(commits) < 2 else
+            f"{len(commits)} commits of {dates[0]} to {dates[-1]}, [listed by part](#commits)")
+
+
+def versions(parts):
+    """What each part was measured with, the latest first; nothing where all were measured with one."""
+    made_of = {}
+    for part, made in parts.items():
+        made_of.setdefault((made["date"][:len("2000-01-01 00:00")], made["commit"], made["machine"]), []).append(part)
+    if len(made_of) < 2:
+        return ""
+    return "## Commits\n\nWhat the parts of this report were measured with:\n\n" + table(
+        ["date, UTC", "commit", "machine", "parts, or their scenes"],
+        [[*version, "; ".join(made)] for version, made in sorted(made_of.items(), reverse=True)])
 
 
 def pictures(out):
