@@ -219,7 +219,7 @@ static void expect_bits_of(trc_scene scene, uint32_t sampler, const uint32_t *co
 
 static void bits_of_one_render(void **state) {
     (void)state;
-    static const uint32_t all[] = {2, 5, SAMPLES, 0}, some[] = {5, 0};
+    static const uint32_t all[] = {1, 2, 5, SAMPLES, 0}, some[] = {5, 0};
     for (int view = 0; view < VIEW_COUNT; view++) {
         const trc_scene scene = create_scene((enum view)view);
         expect_bits_of(scene, TRC_SAMPLER_SOBOL, all);

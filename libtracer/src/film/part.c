@@ -89,15 +89,14 @@ trc_status trc_film_read_sums(const struct trc_film *film, uint32_t sums, double
 /* The arrays of a part by number of sums, NULL for those that there are not. */
 struct part {
     const double *values[TRC_SUMS_END];
-    uint32_t matte_count; /* places of a pixel's table */
+    uint32_t matte_count; /* places of a pixel's table, more than the film's unless it is whole */
 };
 
-/* Doubles of a pixel that a part of this film has under a number: its tables of mattes are larger.
- */
-static uint32_t part_channels(const struct trc_film *film, uint32_t sums) {
+/* Doubles of a pixel that a part for this film has under a number. */
+static uint32_t part_channels(const struct trc_film *film, const struct part *part, uint32_t sums) {
     const uint32_t channels = trc_film_sums_channels(film, sums);
     const bool is_matte = channels && matte_kind(sums) < TRC_CRYPTOMATTE_KINDS;
-    return is_matte ? MATTE_CHANNELS * (TRC_MAX_CRYPTOMATTE_DEPTH + TRC_SPARE_MATTES) : channels;
+    return is_matte ? MATTE_CHANNELS * part->matte_count : channels;
 }
 
 /* Values that a film cannot have would be read as numbers of another type. */
@@ -122,16 +121,16 @@ static trc_status check_values(const trc_sums *sums, uint32_t sample_subset) {
     return TRC_OK;
 }
 
-static trc_status open_part(const struct trc_film *film, const trc_part_desc *desc,
+static trc_status open_part(const struct trc_film *film, const trc_part_desc *desc, bool is_whole,
                             struct part *part) {
     memset(part, 0, sizeof *part);
-    part->matte_count = TRC_MAX_CRYPTOMATTE_DEPTH + TRC_SPARE_MATTES;
+    part->matte_count = is_whole ? film->matte_count : TRC_MAX_CRYPTOMATTE_DEPTH + TRC_SPARE_MATTES;
     TRC_TRY(trc_check_array(desc->sums, desc->sums_count, desc->sums_count, sizeof *desc->sums,
                             _Alignof(trc_sums), "sums"));
     for (uint32_t i = 0; i < desc->sums_count; i++) {
         const trc_sums *sums = &desc->sums[i];
         TRC_TRY(trc_check_struct(sums, sizeof *sums, "trc_sums"));
-        const uint32_t channels = part_channels(film, sums->number);
+        const uint32_t channels = part_channels(film, part, sums->number);
         if (!channels || part->values[sums->number])
             return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "the part has sums %" PRIu32 "%s",
                             sums->number, channels ? " twice" : ", the film has not");
@@ -230,9 +229,9 @@ static void add_pixel(struct trc_film *film, const struct part *part, uint64_t p
 }
 
 trc_status trc_film_add_part(struct trc_film *film, struct trc_adaptive_pixel *adaptive,
-                             const trc_part_desc *desc) {
+                             const trc_part_desc *desc, bool is_whole) {
     struct part part;
-    TRC_TRY(open_part(film, desc, &part));
+    TRC_TRY(open_part(film, desc, is_whole, &part));
     const double *combined = part.values[TRC_PASS_COMBINED];
     const double *caught = part.values[TRC_SUMS_CATCHERS];
     for (uint64_t i = 0; i < pixel_count(film); i++) {

@@ -15,8 +15,9 @@ trc_status trc_film_read_sums(const struct trc_film *film, uint32_t sums, double
                               uint64_t double_count);
 
 /* Adds what such a film had of a part, to pixels that still get samples, with adaptive sampling.
- * adaptive: their reasons and sums, or NULL. INVALID_ARGUMENT leaves all as it was. */
+ * adaptive: their reasons and sums, or NULL. is_whole: the part has all samples of the picture.
+ * INVALID_ARGUMENT leaves all as it was. */
 trc_status trc_film_add_part(struct trc_film *film, struct trc_adaptive_pixel *adaptive,
-                             const trc_part_desc *part);
+                             const trc_part_desc *part, bool is_whole);
 
 #endif

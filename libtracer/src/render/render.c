@@ -497,7 +497,8 @@ static trc_status check_part(const struct trc_render_state *render, const trc_pa
 
 trc_status trc_render_state_add(struct trc_render_state *render, const trc_part_desc *part) {
     TRC_TRY(check_part(render, part));
-    TRC_TRY(trc_film_add_part(&render->film, render->adaptive.pixels, part));
+    const bool is_whole = part->sample_subset == render->schedule.sample_count;
+    TRC_TRY(trc_film_add_part(&render->film, render->adaptive.pixels, part, is_whole));
     render->merged_count += part->sample_subset;
     if (render->adaptive.pixels &&
         render->merged_count == trc_adaptive_next_stage(&render->adaptive, part->sample_offset))
