@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "core/core.h"
 #include "rng.h"
 
 enum {
@@ -401,11 +402,79 @@ static void misuse(void **state) {
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
 }
 
+static trc_render_progress poll(trc_render render) {
+    trc_render_progress progress = trc_render_progress_default();
+    assert_int_equal(trc_render_poll(render, &progress), TRC_OK);
+    return progress;
+}
+
+/* A merge that has all its parts, and is not finished. */
+static trc_render start_merge(trc_scene scene, const trc_render_desc *desc) {
+    static struct part part;
+    trc_render render = 0;
+    assert_int_equal(trc_merge_start(desc, 1, &render), TRC_OK);
+    part_draw(scene, *desc, 0, SAMPLES, &part);
+    assert_int_equal(trc_merge_add(render, &part.desc), TRC_OK);
+    part_free(&part);
+    return render;
+}
+
+/* What was cancelled is not done later, and its time is that since the start of the merge. */
+static void ends(void **state) {
+    (void)state;
+    const trc_scene scene = create_scene(STILL);
+    const trc_render_desc desc = whole_desc();
+    trc_render render = start_merge(scene, &desc);
+    assert_int_equal(trc_render_cancel(render), TRC_OK);
+    assert_int_equal(trc_merge_finish(render), TRC_ERROR_INVALID_ARGUMENT);
+    assert_non_null(strstr(trc_last_message(), "has ended"));
+    assert_int_equal(poll(render).state, TRC_PROGRESS_CANCELLED);
+    assert_int_equal(trc_render_destroy(render), TRC_OK);
+
+    render = start_merge(scene, &desc);
+    const double seconds = poll(render).seconds;
+    assert_int_equal(trc_merge_finish(render), TRC_OK);
+    assert_int_equal(trc_render_wait(render, -1.0), TRC_OK);
+    assert_int_equal(poll(render).state, TRC_PROGRESS_DONE);
+    assert_true(poll(render).seconds >= seconds);
+    assert_int_equal(trc_render_destroy(render), TRC_OK);
+    assert_int_equal(trc_scene_destroy(scene), TRC_OK);
+}
+
+/* Of a merge for which the system has no thread, all is as before: it can be finished later. */
+static void finish_without_threads(void **state) {
+    (void)state;
+    const trc_scene scene = create_scene(STILL);
+    trc_render_desc desc = whole_desc();
+    desc.denoise = TRC_DENOISE_FINAL;
+    struct picture whole = draw(scene, &desc);
+    const trc_render render = start_merge(scene, &desc);
+    trc_memory_fail_at(0, true);
+    const trc_status status = trc_merge_finish(render);
+    trc_memory_fail_at(-1, false);
+    assert_int_equal(status, TRC_ERROR_OUT_OF_MEMORY);
+    assert_int_equal(poll(render).state, TRC_PROGRESS_RUNNING);
+    assert_int_equal(poll(render).tiles_done, 0);
+    assert_int_equal(trc_merge_finish(render), TRC_OK);
+    assert_int_equal(trc_render_wait(render, -1.0), TRC_OK);
+    struct picture merged = read_all(render);
+    expect_same_bits(whole, merged, "a second finish");
+    free(whole.pixels);
+    free(merged.pixels);
+    assert_int_equal(trc_render_destroy(render), TRC_OK);
+    assert_int_equal(trc_scene_destroy(scene), TRC_OK);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(bits_of_one_render),    cmocka_unit_test(catchers_apart),
-        cmocka_unit_test(adaptive_sampling),     cmocka_unit_test(reconstruction),
-        cmocka_unit_test(parts_that_do_not_fit), cmocka_unit_test(misuse),
+        cmocka_unit_test(bits_of_one_render),
+        cmocka_unit_test(catchers_apart),
+        cmocka_unit_test(adaptive_sampling),
+        cmocka_unit_test(reconstruction),
+        cmocka_unit_test(parts_that_do_not_fit),
+        cmocka_unit_test(misuse),
+        cmocka_unit_test(ends),
+        cmocka_unit_test(finish_without_threads),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -292,8 +292,9 @@ TRC_API trc_status trc_merge_start(const trc_render_desc *desc, uint32_t has_cat
  * pixels may stop. INVALID_ARGUMENT leaves the film as it is. Not from two threads at once. */
 TRC_API trc_status trc_merge_add(trc_render render, const trc_part_desc *part);
 
-/* All parts are there, or INVALID_ARGUMENT: the picture is reconstructed, where desc says so, in
- * the background, and the render ends. */
+/* All parts are there, or INVALID_ARGUMENT, as after a cancel: the picture is reconstructed, where
+ * desc says so, in the background, and the render ends. OUT_OF_MEMORY or NO_THREAD, for which it
+ * can be called again. Not while trc_merge_add runs. */
 TRC_API trc_status trc_merge_finish(trc_render render);
 
 /* Cancels, waits and frees. The handle becomes stale. */

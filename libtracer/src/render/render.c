@@ -250,15 +250,20 @@ static void reconstruct(struct trc_render_state *render, void *memory) {
     }
 }
 
+/* Under the lock. state: TRC_PROGRESS_DONE or TRC_PROGRESS_CANCELLED. */
+static void end(struct trc_render_state *render, uint32_t state) {
+    render->state = state;
+    render->time_end = trc_seconds();
+    pthread_cond_broadcast(&render->ended);
+}
+
 /* The last one to leave ends the render. */
 static void leave(struct trc_render_state *render) {
     pthread_mutex_lock(&render->lock);
     if (--render->running_count == 0) {
         const bool complete = render->tiles_done == render->schedule.tile_count &&
                               render->denoise_done == denoise_item_count(render);
-        render->state = complete ? TRC_PROGRESS_DONE : TRC_PROGRESS_CANCELLED;
-        render->time_end = trc_seconds();
-        pthread_cond_broadcast(&render->ended);
+        end(render, complete ? TRC_PROGRESS_DONE : TRC_PROGRESS_CANCELLED);
     }
     pthread_mutex_unlock(&render->lock);
 }
@@ -393,13 +398,10 @@ static void free_memory(struct trc_render_state *render) {
     trc_free(render);
 }
 
-/* NO_THREAD only if not one could be started. */
+/* The caller is counted as running, so that early ends do not end the render, and leaves it where a
+ * thread was started. NO_THREAD only if not one could be. */
 static trc_status start_workers(struct trc_render_state *render) {
     trc_status status = TRC_OK;
-    pthread_mutex_lock(&render->lock);
-    render->time_start = trc_seconds();
-    render->running_count = 1; /* this thread, so that early ends do not end the render */
-    pthread_mutex_unlock(&render->lock);
     for (uint32_t i = 0; i < render->worker_count && status == TRC_OK; i++) {
         struct worker *worker = &render->workers[i];
         pthread_mutex_lock(&render->lock);
@@ -411,8 +413,10 @@ static trc_status start_workers(struct trc_render_state *render) {
         else
             leave(render);
     }
+    if (!render->started_count)
+        return status;
     leave(render);
-    return render->started_count ? TRC_OK : status;
+    return TRC_OK;
 }
 
 /* A render without threads yet. snapshot: NULL, or the caller's reference, which it takes. */
@@ -436,6 +440,7 @@ static trc_status create(struct trc_snapshot *snapshot, const trc_render_desc *d
         free_memory(render);
         return status;
     }
+    render->time_start = trc_seconds();
     *render_out = render;
     return TRC_OK;
 }
@@ -445,6 +450,7 @@ trc_status trc_render_state_start(struct trc_snapshot *snapshot, const trc_rende
     struct trc_render_state *render;
     TRC_TRY(create(trc_snapshot_retain(snapshot), desc,
                    snapshot->features & TRC_FEATURE_SHADOW_CATCHERS, &render));
+    render->running_count = 1;
     const trc_status status = start_workers(render);
     if (status != TRC_OK) {
         trc_render_state_destroy(render);
@@ -460,7 +466,6 @@ trc_status trc_render_state_merge(const trc_render_desc *desc, bool has_catchers
                                   struct trc_render_state **render_out) {
     TRC_TRY(create(NULL, desc, has_catchers, render_out));
     struct trc_render_state *render = *render_out;
-    render->time_start = trc_seconds();
     const struct trc_schedule *schedule = &render->schedule;
     atomic_store(&render->next_item, (uint64_t)schedule->batch_count * schedule->tile_count);
     return TRC_OK;
@@ -475,11 +480,18 @@ static void decide(struct trc_render_state *render, uint32_t samples) {
     }
 }
 
-static trc_status check_part(const struct trc_render_state *render, const trc_part_desc *part) {
+/* Under the lock: whether parts can still come. */
+static trc_status check_merge_runs(const struct trc_render_state *render) {
+    const bool is_open = render->state == TRC_PROGRESS_RUNNING && !render->tiles_done;
+    return is_open ? TRC_OK : trc_fail(TRC_ERROR_INVALID_ARGUMENT, "the merge has ended");
+}
+
+static trc_status check_part(struct trc_render_state *render, const trc_part_desc *part) {
     const uint32_t begin = part->sample_offset, count = render->schedule.sample_count;
-    if (render->state != TRC_PROGRESS_RUNNING || render->tiles_done) {
-        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "the merge has ended");
-    }
+    pthread_mutex_lock(&render->lock);
+    const trc_status status = check_merge_runs(render);
+    pthread_mutex_unlock(&render->lock);
+    TRC_TRY(status);
     if (begin != render->merged_count) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "the part begins at sample %u, not at %u",
                         begin, render->merged_count);
@@ -511,19 +523,44 @@ trc_status trc_render_state_add(struct trc_render_state *render, const trc_part_
     return TRC_OK;
 }
 
-trc_status trc_render_state_finish(struct trc_render_state *render) {
+/* Under the lock: no part comes any more, and the caller is counted as running. */
+static trc_status close_merge(struct trc_render_state *render) {
     const struct trc_schedule *schedule = &render->schedule;
+    TRC_TRY(check_merge_runs(render));
     if (render->merged_count != schedule->sample_count) {
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "parts are missing: samples %u to %u",
                         render->merged_count, schedule->sample_count);
     }
-    if (render->tiles_done)
-        return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "the merge has ended");
-    pthread_mutex_lock(&render->lock);
     render->tiles_done = schedule->tile_count;
     render->lowest_batch = schedule->batch_count;
+    render->running_count = 1;
+    return TRC_OK;
+}
+
+/* As before close_merge, or cancelled meanwhile. */
+static void reopen_merge(struct trc_render_state *render) {
+    pthread_mutex_lock(&render->lock);
+    render->tiles_done = 0;
+    render->lowest_batch = 0;
+    render->running_count = 0;
+    if (atomic_load(&render->cancel))
+        end(render, TRC_PROGRESS_CANCELLED);
     pthread_mutex_unlock(&render->lock);
-    return start_workers(render);
+}
+
+trc_status trc_render_state_finish(struct trc_render_state *render) {
+    pthread_mutex_lock(&render->lock);
+    trc_status status = close_merge(render);
+    pthread_mutex_unlock(&render->lock);
+    TRC_TRY(status);
+    if (!denoise_item_count(render)) { /* nothing to do for threads */
+        leave(render);
+        return TRC_OK;
+    }
+    status = start_workers(render);
+    if (status != TRC_OK)
+        reopen_merge(render);
+    return status;
 }
 
 /* ---- what the caller sees ---- */
@@ -532,11 +569,8 @@ void trc_render_state_cancel(struct trc_render_state *render) {
     pthread_mutex_lock(&render->lock);
     atomic_store(&render->cancel, 1);
     pthread_cond_broadcast(&render->tile_done);
-    if (render->state == TRC_PROGRESS_RUNNING && !render->running_count) { /* an unfinished merge */
-        render->state = TRC_PROGRESS_CANCELLED;
-        render->time_end = trc_seconds();
-        pthread_cond_broadcast(&render->ended);
-    }
+    if (render->state == TRC_PROGRESS_RUNNING && !render->running_count) /* an unfinished merge */
+        end(render, TRC_PROGRESS_CANCELLED);
     pthread_mutex_unlock(&render->lock);
 }
 
