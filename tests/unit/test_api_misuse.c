@@ -734,6 +734,44 @@ static void images(void **state) {
     REFUSED(HANDLE, trc_image_destroy(scene, id));
 }
 
+/* What a later version gives a meaning is 0 in programs of this one. */
+static void reserved_fields(void **state) {
+    (void)state;
+    trc_id id = UNTOUCHED;
+    trc_material_desc material = trc_material_desc_default();
+    material.reserved = 1;
+    REFUSED(ARGUMENT, trc_material_create(scene, &material, &id));
+    trc_reader_desc reader = trc_reader_desc_default();
+    reader.reserved = 1;
+    REFUSED(ARGUMENT, trc_reader_create(&reader, &id));
+
+    const float points[8] = {0}, values[2] = {0};
+    const uint32_t length = 2;
+    trc_curve_attribute attribute = trc_curve_attribute_default();
+    attribute.name = "UVMap";
+    attribute.values = values;
+    attribute.value_count = 2;
+    attribute.per_strand = 1;
+    attribute.reserved = 1;
+    trc_curves_desc curves = trc_curves_desc_default();
+    curves.point_count = 2;
+    curves.points = points;
+    curves.point_value_count = 8;
+    curves.lengths = &length;
+    curves.strand_count = 1;
+    curves.attributes = &attribute;
+    curves.attribute_count = 1;
+    REFUSED(ARGUMENT, trc_curves_create(scene, &curves, &id));
+    assert_true(id == UNTOUCHED);
+
+    const trc_rays rays = trc_rays_default();
+    uint32_t instance = 0;
+    trc_hits hits = trc_hits_default();
+    hits.instance = &instance;
+    hits.reserved = 1;
+    REFUSED(ARGUMENT, trc_query_closest(scene, &rays, 0, &hits));
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         TEST(bad_handles),     TEST(bad_ids),      TEST(wrong_struct_sizes),
@@ -742,6 +780,7 @@ int main(void) {
         TEST(mesh_attributes), TEST(mesh_updates), TEST(bad_vertices_are_counted),
         TEST(instances),       TEST(lights),       TEST(cameras),
         TEST(worlds),          TEST(materials),    TEST(images),
+        TEST(reserved_fields),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -14,6 +14,7 @@ static trc_status check_attribute(const trc_curve_attribute *attribute,
                                   const trc_curves_desc *desc) {
     const char *name = "trc_curve_attribute";
     TRC_TRY(trc_check_struct(attribute, sizeof *attribute, name));
+    TRC_TRY(trc_check_enum(attribute->reserved, 1, "reserved"));
     if (attribute->width != 2 && attribute->width != 4)
         return trc_fail(TRC_ERROR_INVALID_ARGUMENT, "%s: width is %" PRIu32 ", it can be 2 or 4",
                         name, attribute->width);

@@ -13,6 +13,7 @@
 /* Arrays and their counts; what nodes mean is checked as they are compiled. */
 static trc_status check_material(const trc_material_desc *desc) {
     TRC_TRY(trc_check_struct(desc, sizeof *desc, "trc_material_desc"));
+    TRC_TRY(trc_check_enum(desc->reserved, 1, "reserved"));
     TRC_TRY(trc_check_count(desc->node_count, 0, TRC_MAX_NODES, "node_count"));
     TRC_TRY(
         trc_check_count(desc->input_count, 0, TRC_MAX_NODES * TRC_MAX_NODE_INPUTS, "input_count"));

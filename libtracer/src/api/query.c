@@ -47,6 +47,7 @@ static trc_status check_rays(const trc_rays *rays) {
 
 static trc_status check_hits(const trc_hits *hits, uint64_t count) {
     TRC_TRY(trc_check_struct(hits, sizeof *hits, "trc_hits"));
+    TRC_TRY(trc_check_enum(hits->reserved, 1, "reserved"));
     TRC_TRY(check_column(hits->instance, count, true, "instance"));
     const struct {
         const void *column;

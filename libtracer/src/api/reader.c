@@ -6,6 +6,7 @@
 
 trc_status trc_reader_create(const trc_reader_desc *desc, trc_reader *reader_out) {
     TRC_TRY(trc_check_struct(desc, sizeof *desc, "trc_reader_desc"));
+    TRC_TRY(trc_check_enum(desc->reserved, 1, "reserved"));
     TRC_TRY(trc_check_out(reader_out, sizeof *reader_out, "reader_out"));
     struct trc_image_reader *reader;
     TRC_TRY(trc_image_reader_create(desc->program, desc->script, &reader));
