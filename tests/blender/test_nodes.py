@@ -310,8 +310,8 @@ def _for_each_engine(material):
 
 
 def inside_outputs_by_engine():
-    """A wall whose tree has a node of an add-on that is gone, by Volley and by Cycles, and what Volley warns of a tree
-    with a repeat zone."""
+    """A wall whose tree has a node of an add-on that is gone, by Volley and by Cycles, what Volley warns of a tree
+    with a repeat zone, and whether one with such a node and an output for all engines is unrolled."""
     import bpy
     import scenes
     from volley.sync import flatten, inlined
@@ -327,7 +327,11 @@ def inside_outputs_by_engine():
     scenes.wall("Wall", 6.0, 0.0, material=material)
     bpy.utils.register_class(Gone)
     _for_each_engine(material).nodes.new(Gone.bl_idname)
+    plain = scenes.emitter((0.2, 0.4, 0.6), "Plain")
+    plain.node_tree.nodes.new(Gone.bl_idname)
     bpy.utils.unregister_class(Gone)
+    with inlined.shader_tree(plain) as (_, is_unrolled):
+        pass
     pictures = scenes.by_both(4)
     told = set()
     if bpy.app.version >= (5, 0, 0):
@@ -338,13 +342,15 @@ def inside_outputs_by_engine():
         tree.links.new(end.outputs["Sum"], tree.nodes["Emission"].inputs["Strength"])
         with inlined.shader_tree(bpy.data.materials["Repeated"]) as (read, _):
             flatten.flatten(read, "Repeated", told)
-    return pictures, sorted(told)
+    return pictures, sorted(told), is_unrolled
 
 
 def test_outputs_by_engine(blender):
-    """Blender's inlined trees lack outputs for one engine alone: the wall was black."""
+    """Blender's inlined trees lack outputs for one engine alone: the wall was black. They also lack nodes of add-ons,
+    which are to be warned of."""
     import blender as blender_support
-    (ours, theirs), told = blender.run(inside_outputs_by_engine)
+    (ours, theirs), told, is_unrolled = blender.run(inside_outputs_by_engine)
     assert ours[8, 8, :3] == pytest.approx((0.2, 0.4, 0.6), rel=1e-5)
     assert abs(ours - theirs).max() < 1e-5
     assert [line for line in told if "Repeat" in line] or blender_support.version() < (5, 0)
+    assert not is_unrolled
