@@ -28,7 +28,7 @@ typedef struct trc_camera_desc {
     uint32_t struct_size;    /* of this structure; checked */
     uint32_t type;           /* TRC_CAMERA_* */
     uint32_t key_count;      /* 1..TRC_MAX_KEYS evenly spaced over the shutter */
-    uint32_t blade_count;    /* 0..2: round aperture */
+    uint32_t blade_count;    /* up to 1024; 0..2: round aperture */
     const float *transforms; /* camera to world, 12 floats per key: the axes' lengths are ignored,
                                 their directions count, shear and all; refused if singular */
     const float *windows; /* left, right, bottom, top per key (zoom blur), or one key's 4 floats */
@@ -40,8 +40,9 @@ typedef struct trc_camera_desc {
     float blade_rotation;       /* radians from +X to +Y, of the middle of an edge */
     float aperture_ratio;       /* anamorphic, > 0, 1 round */
     float shutter_time;         /* in frames; 0: no motion, time is 0.5 for all rays */
-    uint32_t shutter_curve_count; /* 0: box; else samples of the shutter's opening over [0, 1] */
-    const float *shutter_curve;   /* that many, >= 0; NULL without */
+    uint32_t shutter_curve_count; /* 0: box; else up to 65536 samples of the shutter's opening over
+                                     [0, 1] */
+    const float *shutter_curve;   /* that many, >= 0, all of them 0: box; NULL without */
     /* Of panoramas; each type reads its own. Radians, the middle of the view at 0. */
     float longitude_min, longitude_max; /* to the right: EQUIRECTANGULAR, CYLINDRICAL */
     float latitude_min, latitude_max;   /* up: EQUIRECTANGULAR */

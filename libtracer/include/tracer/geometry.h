@@ -167,11 +167,12 @@ typedef struct trc_instance_desc {
     const float *transforms; /* 12 floats per key, see base.h; what they flatten is shown flat;
                                 where all keys make it a line or a point, or one is not finite, the
                                 instance is hidden and counted in trc_scene_stats */
-    const trc_id *materials; /* material of each slot; 0: the default grey diffuse */
+    const trc_id *materials; /* material of each slot; 0: the default grey diffuse, in Cryptomatte's
+                                materials "default_surface" as in Cycles */
     uint32_t material_count; /* a triangle's slot beyond the last uses the last; 0: default */
     uint32_t visibility;     /* TRC_VISIBLE_* */
     int32_t pass_index;      /* Object Index pass */
-    float random;            /* Object Info's Random, [0, 1) */
+    float random;            /* Object Info's Random, finite; in Blender [0, 1) */
     float color[4];          /* Object Info's Color and Alpha */
     float cryptomatte_object, cryptomatte_asset; /* trc_cryptomatte_id of its name and of its
                                                     asset's name; 0: in no matte */

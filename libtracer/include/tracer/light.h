@@ -53,7 +53,7 @@ typedef struct trc_light_desc {
     uint32_t use_mis;     /* reflected and refracted rays see it ("multiple importance") */
     uint32_t light_group; /* 0..TRC_MAX_LIGHT_GROUPS */
     uint32_t flags;       /* TRC_LIGHT_SPHERE and the like */
-    float random;         /* Object Info's Random for its nodes, [0, 1) */
+    float random;         /* Object Info's Random for its nodes, finite */
     uint32_t
         bounce_limit;   /* points that the path reaches after so many bounces or more get no light
                            samples of it; 0: all do. Rays that meet it see it all the same */
@@ -100,7 +100,7 @@ typedef struct trc_world_desc {
     uint32_t use_sampling;   /* 1: the environment image is sampled by importance */
     trc_id material;         /* a material whose surface is BACKGROUND (or a mix); 0: black */
     uint32_t visibility;     /* TRC_VISIBLE_* */
-    uint32_t map_resolution; /* width of the importance map, 0: chosen from the image */
+    uint32_t map_resolution; /* width of the importance map, up to 16384; 0: from the image */
     float ao_distance;       /* ambient occlusion: metres, > 0; 0 if it is off */
     float ao_factor;         /* 0: off */
     uint32_t ao_method;      /* TRC_AO_* */

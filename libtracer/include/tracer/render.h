@@ -131,7 +131,7 @@ typedef struct trc_render_desc {
     uint32_t sampler;     /* TRC_SAMPLER_* */
     uint32_t seed;        /* another number gives other noise */
     uint32_t filter;      /* TRC_FILTER_* */
-    float filter_width;   /* pixels, > 0 */
+    float filter_width;   /* pixels, > 0, up to 100 */
     uint32_t film_transparent; /* 1: the background adds no radiance and no alpha */
     /* 1: a transparent film is so behind glass, too, up to a roughness (0..1, as Principled has
      * it): what refracted rays see of the background adds neither radiance nor alpha. */
@@ -139,7 +139,7 @@ typedef struct trc_render_desc {
     float film_transparent_roughness;
     float film_exposure;   /* factor on Combined and light passes */
     uint64_t passes;       /* bit per TRC_PASS_*, COMBINED is always there */
-    uint32_t thread_count; /* 0: one per logical processor */
+    uint32_t thread_count; /* up to 1024; 0: one per logical processor */
     uint32_t progressive;  /* 1: whole frame, samples in rising batches (previews); 0: tiles to
                               the end one after the other */
     /* Adaptive sampling, off where noise_threshold is 0: a pixel gets min_samples (rounded up to a

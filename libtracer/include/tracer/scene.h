@@ -12,7 +12,7 @@ TRC_BEGIN_DECLS
 
 typedef struct trc_scene_desc {
     uint32_t struct_size;  /* of this structure; checked */
-    uint32_t thread_count; /* for builds; 0: one per logical processor */
+    uint32_t thread_count; /* for builds, up to 1024; 0: one per logical processor */
     uint32_t is_final;     /* 1: final frame, best trees, static meshes of one instance, and small
                               ones of several, are joined in world space; 0: interactive, per-mesh trees
                               that can be refitted */
