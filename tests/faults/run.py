@@ -218,6 +218,11 @@ def find_reach(tests, store, again, workers):
     return reach
 
 
+def _why_struck(fault):
+    """Why a fault is not run, None if it is."""
+    return fault.get("equivalent") or ("since" in fault and f"shows in Blender {fault['since']} and later") or None
+
+
 def write_table(path, results, struck):
     """Counts by area, survivors, and the whole list."""
     areas = {}
@@ -230,7 +235,7 @@ def write_table(path, results, struck):
     lines += ["", "| | fault | caught by | how | seconds |", "|---|---|---|---|---|"]
     lines += [f"| {r['number']} | {r['what']} ({r['file']}) | {r['by'] or 'SURVIVED'} | {r['how']} | {r['seconds']} |"
               for r in sorted(results, key=lambda r: (r["by"] is not None, r["number"]))]
-    lines += [f"| {f['number']} | {f['what']} ({f['file']}) | struck out | {f['equivalent']} | |" for f in struck]
+    lines += [f"| {f['number']} | {f['what']} ({f['file']}) | struck out | {_why_struck(f)} | |" for f in struck]
     path.write_text("\n".join(lines) + "\n")
 
 
@@ -259,8 +264,8 @@ def main():
     store = out / "results.json"
     results = {r["number"]: r for r in json.loads(store.read_text())} if store.is_file() else {}
     listed = tree.faults()
-    struck = [fault for fault in listed if "equivalent" in fault]
-    live = [fault for fault in listed if "equivalent" not in fault]
+    struck = [fault for fault in listed if _why_struck(fault)]
+    live = [fault for fault in listed if not _why_struck(fault)]
     results = {number: r for number, r in results.items() if number in {f["number"] for f in live}}
     named = {int(number) for number in arguments.only.split(",") if number}
     survivors = {number for number, r in results.items() if r["by"] is None} if arguments.survivors else set()
