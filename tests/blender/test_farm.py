@@ -81,7 +81,7 @@ def _same(path, whole):
 
 
 def merged_bits(folder):
-    """{case: numbers that differ} of parts of 2, 5 and 64 blocks and of an odd range, and settings that stop
+    """{case: numbers that differ} of parts of 1, 2, 5 and 64 blocks and of an odd range, and settings that stop
     pixels or denoise."""
     import bpy
     from volley.farm import command
@@ -93,7 +93,7 @@ def merged_bits(folder):
         for name, value in settings.items():
             setattr(scene.volley, name, value)
         whole = _whole(scene)
-        for count in {"plain": (2, 5, 64), "adaptive": (16,), "denoise": (2,)}[case]:
+        for count in {"plain": (1, 2, 5, 64), "adaptive": (16,), "denoise": (2,)}[case]:
             parts = f"{folder}/{case}{count}"
             assert command.run(["render", "--parts", parts, "--blocks", f"0-{count - 1}/{count}"]) == 0
             assert command.run(["merge", parts, "--output", f"{parts}_##"]) == 0
@@ -109,7 +109,7 @@ def merged_bits(folder):
 
 def test_merged_frames_have_the_bits_of_one_render(tmp_path):
     assert Blender().run(merged_bits, str(tmp_path)) == dict.fromkeys(
-        ("plain 2", "plain 5", "operator", "plain 64", "adaptive 16", "denoise 2"), 0)
+        ("plain 1", "plain 2", "plain 5", "operator", "plain 64", "adaptive 16", "denoise 2"), 0)
 
 
 @contextlib.contextmanager
