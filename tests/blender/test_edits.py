@@ -149,6 +149,13 @@ def inside_edits_in_turn():
     in_turn["object that it looks at"] = lambda: setattr(other, "location", (-0.9, -0.5, -0.7))
     in_turn["light's group"] = lambda: setattr(
         group.nodes["RGB"].outputs[0], "default_value", (0.9, 0.1, 0.1, 1.0))
+    collection = bpy.data.collections.new("Cut")
+    scene.collection.children.link(collection)
+    collection.objects.link(bpy.data.objects["Ball"])
+    scene.collection.objects.unlink(bpy.data.objects["Ball"])
+    cut = bpy.context.view_layer.layer_collection.children["Cut"]
+    in_turn["hole"] = lambda: setattr(cut, "holdout", True)
+    in_turn["no hole"] = lambda: setattr(cut, "holdout", False)
     follower = Follower()
     former, found = follower.picture(), {}
     for name, edit in in_turn.items():
