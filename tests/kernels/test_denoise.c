@@ -269,21 +269,22 @@ static void many_samples(void **state) {
 }
 
 /* What is lost in the noise of pixels but not in that of their surroundings is hardly blurred. With
- * estimates of single pixels alone the last ratio is 1.54, where no residual is given back 1.15. */
+ * estimates of single pixels alone the last ratio is 1.19; at 256 samples it is 1.15 where no
+ * residual is given back. */
 static void broad_waves(void **state) {
     (void)state;
     static struct picture p;
-    double ratio[3];
-    for (int k = 0; k < 3; k++) {
+    double ratio[4];
+    for (int k = 0; k < 4; k++) {
         const trc_render_desc desc = desc_of(16u << 2 * k);
         film_show(&desc, waves, &p);
         ratio[k] = broad_error_of(p.clean, waves) / broad_error_of(p.plain, waves);
     }
     print_figure("31: waves below the noise",
-                 "error of 5x5 pixels' means %.2f, %.2f, %.2f of plain ones' "
-                 "at 16, 64, 256 samples",
-                 ratio[0], ratio[1], ratio[2]);
-    assert_true(ratio[0] < 1.05 && ratio[1] < 1.05 && ratio[2] < 1.0);
+                 "error of 5x5 pixels' means %.2f, %.2f, %.2f, %.2f of plain ones' "
+                 "at 16, 64, 256, 1024 samples",
+                 ratio[0], ratio[1], ratio[2], ratio[3]);
+    assert_true(ratio[0] < 1.05 && ratio[1] < 1.05 && ratio[2] < 1.0 && ratio[3] < 1.12);
 }
 
 /* Edges of depth stay, as features without noise are not blurred. */
