@@ -18,6 +18,6 @@ trc_status trc_film_read_sums(const struct trc_film *film, uint32_t sums, double
  * adaptive: their reasons and sums, or NULL. is_whole: the part has all samples of the picture.
  * INVALID_ARGUMENT leaves all as it was. */
 trc_status trc_film_add_part(struct trc_film *film, struct trc_adaptive_pixel *adaptive,
-                             const trc_part_desc *part, bool is_whole);
+                             const trc_part_desc *desc, bool is_whole);
 
 #endif
