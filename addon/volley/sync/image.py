@@ -84,8 +84,13 @@ class Images:
             return 0
         if image.source == 'MOVIE':
             return self._id_of_path(image, "", _is_mip_mapped(node), frame_of(node.image_user, self._frame))
-        path = _file_path(image, frame_of(node.image_user, self._frame))
-        return self._id_of_path(image, path, _is_mip_mapped(node))
+        path = _path_on_disk(image, frame_of(node.image_user, self._frame))
+        is_there = os.path.isfile(path)
+        if path and not is_there and image.source == 'SEQUENCE':  # Blender's pixels are those of any of its frames
+            self._asked = self._asked[0], True
+            self._warnings.add(f"Image '{image.name}': {os.path.basename(path)} is missing, magenta is used")
+            return 0
+        return self._id_of_path(image, path if is_there else "", _is_mip_mapped(node))
 
     def tiles_of(self, node):
         """The tiles of a tiled image: (column, row, library's image) of each."""
@@ -389,15 +394,15 @@ def _pixel_alpha_mode(image):
     return abi.AlphaMode.PREMULTIPLIED if image.is_float else abi.AlphaMode.STRAIGHT
 
 
-def _file_path(image, frame):
-    """The absolute path of an image the library can read itself, "" for one of Blender's own; frame: of a
-    sequence."""
+def _path_on_disk(image, frame):
+    """The absolute path of an image that lies in a file, which may be missing, "" for one of Blender's own; frame: of
+    a sequence."""
     if image.source not in {'FILE', 'SEQUENCE'} or image.packed_file is not None or image.is_dirty:
         return ""
     path = image.filepath_from_user()
     if path and image.source == 'SEQUENCE':
         path = path_in_sequence(path, frame)
-    return os.path.abspath(path) if path and os.path.isfile(path) else ""
+    return os.path.abspath(path) if path else ""
 
 
 _NUMBER = re.compile(r"(\d+)(\D*)$")  # of a sequence: the last digits of the name
