@@ -78,8 +78,10 @@ struct trc_light_triangle {
     uint32_t flags;    /* TRC_TRIANGLE_* */
 };
 enum {
-    TRC_TRIANGLE_MOVES = 1, /* its corners depend on time */
-    TRC_TRIANGLE_VARIES = 2 /* its emission is the material's program at the point */
+    TRC_TRIANGLE_MOVES = 1,     /* its corners depend on time */
+    TRC_TRIANGLE_VARIES = 2,    /* its emission is the material's program at the point */
+    TRC_TRIANGLE_ASKS_RAYS = 4, /* which depends on the kind of ray */
+    TRC_TRIANGLE_BY_RAYS = 8    /* and which Cycles does not sample */
 };
 
 /* Bounds of one light or of a subtree: a sphere, a cone of normals, the intensity inside. */
@@ -183,6 +185,7 @@ struct trc_light_table {
     struct trc_world_map *map;    /* NULL: cosine or uniform sampling */
     uint32_t world_visibility;    /* of its light samples */
     bool world_asks_rays;         /* its light depends on the kind of ray */
+    bool triangles_ask_rays;      /* so does that of some emissive triangle */
     bool world_is_shadowless;     /* nothing blocks its samples */
     bool has_shadowless;          /* of a light that rays find, too */
 };

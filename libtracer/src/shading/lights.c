@@ -146,6 +146,11 @@ static void add_triangles(struct trc_light_table *table, const struct trc_snapsh
             t->flags |= TRC_TRIANGLE_VARIES;
             light = fmaxf(light, 1e-3f);
             table->varies = true;
+            if (m->has & TRC_MATERIAL_READS_LOBES) {
+                const bool is_sampled = m->flags & TRC_MATERIAL_SAMPLE_EMISSION;
+                t->flags |= TRC_TRIANGLE_ASKS_RAYS | (is_sampled ? 0 : TRC_TRIANGLE_BY_RAYS);
+                table->triangles_ask_rays = true;
+            }
         }
         table->moves |= (t->flags & TRC_TRIANGLE_MOVES) != 0;
         struct trc_light_bound *bound = &bounds[(*bound_count)++];

@@ -110,8 +110,9 @@ static struct trc_corners moving_corners(const struct draw *d, vint index, vmask
 }
 
 /* Emission that a program computes: the surface at the sampled place, one material after the
- * other. */
-static void evaluate_emission(const struct draw *d, vint index, vfloat u, vfloat v, vmask m) {
+ * other, as rays of that path and those depths see it. Replaces radiance in the lanes of m. */
+static void evaluate_emission(const struct draw *d, vint index, vfloat u, vfloat v, vuint path,
+                              vuint depths, vmask m, vvec3 *radiance) {
     const struct trc_light_triangle *all = d->table->triangles;
     const vint at = index * vi_set(TRC_TRIANGLE_WORDS);
     struct trc_surface e;
@@ -126,7 +127,8 @@ static void evaluate_emission(const struct draw *d, vint index, vfloat u, vfloat
     e.ray_length = d->out->distance;
     e.raster_x = d->s->raster_x;
     e.raster_y = d->s->raster_y;
-    e.depths = trc_depths_beyond(d->s->depths, TRC_DEPTH_ALL_SHIFT);
+    e.path = path;
+    e.depths = depths;
     e.active = m;
     trc_surface_fetch(&e);
     const vint material = vi_gather((const int32_t *)&all->material, at, m);
@@ -139,8 +141,26 @@ static void evaluate_emission(const struct draw *d, vint index, vfloat u, vfloat
         if (program->instruction_count)
             trc_program_run(program, &e, &registers);
         const vvec3 emission = trc_lobes_emission(program, &registers);
-        d->out->radiance = v3_select(e.active, emission, d->out->radiance);
+        *radiance = v3_select(e.active, emission, *radiance);
     }
+}
+
+/* What the triangles of lanes m emit to rays of matt lobes; flags: of the triangles. */
+static __attribute__((noinline)) void sample_matt_radiance(const struct draw *d, vint index,
+                                                           vfloat u, vfloat v, vint flags,
+                                                           vmask m) {
+    struct trc_light_sample *out = d->out;
+    const vmask behind = vf_lt(v3_dot(d->s->ng, out->wi), vf_zero());
+    const vuint reflected = trc_depths_beyond(d->s->depths, TRC_DEPTH_ALL_SHIFT);
+    const vuint transmitted = trc_depths_beyond(d->s->depths, TRC_DEPTH_TRANSMISSION_SHIFT);
+    const vuint depths = (vuint)vi_select(behind, (vint)transmitted, (vint)reflected);
+    vuint kinds[3];
+    trc_lobe_rays(behind, kinds);
+    out->matt_radiance = out->radiance;
+    out->by_rays = vm_and(m, has_bit(flags, TRC_TRIANGLE_BY_RAYS));
+    const vmask asking = vm_and(m, has_bit(flags, TRC_TRIANGLE_ASKS_RAYS));
+    if (vm_any(asking))
+        evaluate_emission(d, index, u, v, kinds[0], depths, asking, &out->matt_radiance);
 }
 
 static void sample_triangles(const struct draw *d, vmask m) {
@@ -164,7 +184,11 @@ static void sample_triangles(const struct draw *d, vmask m) {
     set_place(d, &place, m);
     const vmask varies = t->varies ? vm_and(m, has_bit(flags, TRC_TRIANGLE_VARIES)) : vm_none();
     if (vm_any(varies))
-        evaluate_emission(d, index, u, v, varies);
+        evaluate_emission(d, index, u, v, vu_set(0),
+                          trc_depths_beyond(d->s->depths, TRC_DEPTH_ALL_SHIFT), varies,
+                          &d->out->radiance);
+    if (t->triangles_ask_rays)
+        sample_matt_radiance(d, index, u, v, flags, m);
 }
 
 /* ---- world ---- */
@@ -269,8 +293,12 @@ TRC_INLINE void finish_sample(const struct draw *d, vmask m) {
     struct trc_light_sample *out = d->out;
     if (d->table->hides)
         mark_hidden(d, m);
-    const vvec3 r = out->radiance;
-    const vfloat maximum = vf_max(vf_max(vf_abs(r.x), vf_abs(r.y)), vf_abs(r.z));
+    vfloat maximum = v3_max(v3_abs(out->radiance));
+    if (d->table->triangles_ask_rays) { /* what rays of matt lobes see is not lost */
+        const vmask chosen =
+            vm_andnot(m, vi_lt(d->light, vi_set((int32_t)d->table->first_triangle)));
+        maximum = vf_max(maximum, vf_where(chosen, v3_max(v3_abs(out->matt_radiance))));
+    }
     const vmask finite = vm_and(vf_gt(out->pdf, vf_zero()), vf_lt(out->pdf, vf_set(INFINITY)));
     out->valid = vm_and(m, vm_and(finite, vf_gt(maximum, vf_zero())));
 }

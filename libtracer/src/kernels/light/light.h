@@ -27,6 +27,10 @@ struct trc_light_sample {
     vmask no_mis;    /* reflected rays towards wi do not see this light: weight 1 */
     vmask casts_shadow;
     vint light; /* number for sorting shadow rays; emissive triangles and world included */
+    /* Where trc_light_table.triangles_ask_rays, in lanes that chose a triangle: what it emits to
+     * rays of matt lobes, and those which Cycles finds by such rays alone. */
+    vvec3 matt_radiance;
+    vmask by_rays;
 };
 
 #define TRC_FAR 1e30f

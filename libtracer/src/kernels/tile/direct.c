@@ -144,6 +144,22 @@ static vfloat sampled_part_of_light(const struct trc_surface *s, const struct tr
     return part;
 }
 
+/* Replaces what matt lobes have of lanes whose sample is of an emissive triangle: Cycles' samples
+ * are of no kind of ray, and the rays of matt lobes, which are not followed here, find the rest. */
+static __attribute__((noinline)) void triangle_light_by_kind(const struct arrival *a,
+                                                             const struct trc_surface *s,
+                                                             const struct trc_light_sample *l,
+                                                             vfloat scale, vmask active,
+                                                             vvec3 *matt) {
+    const vint first = vi_set((int32_t)s->snapshot->lights->first_triangle);
+    const vmask m = vm_andnot(active, vi_lt(l->light, first));
+    if (!vm_any(m))
+        return;
+    const vfloat part = sampled_part_of_light(s, l, matt_density(s, l), vm_andnot(m, l->by_rays));
+    const vvec3 seen = v3_lerp(l->matt_radiance, l->radiance, part);
+    *matt = v3_select(m, v3_mul(a->weight, v3_scale(seen, scale)), *matt);
+}
+
 /* Lanes whose samples stand for what rays bring in Cycles: all that mis is above Cycles' part of
  * samples, by chance, and all of worlds that it does not sample. by_ray: the density of rays, of
  * matt lobes 0. */
@@ -210,6 +226,8 @@ static vmask light_contribute(const struct trc_tile *t, const struct arrival *a,
     light[0] = light[1] = light[2] = v3_mul(a->weight, v3_scale(l->radiance, scale));
     if (t->snapshot->lights->world_asks_rays)
         world_light_by_kind(a, s, l, scale, active, light);
+    if (t->snapshot->lights->triangles_ask_rays)
+        triangle_light_by_kind(a, s, l, scale, active, &light[0]);
 #define SEEN(bit) vi_eq((vint)(seen & vu_set(bit)), vi_set(bit))
     out->diffuse =
         v3_mul(light[0],
