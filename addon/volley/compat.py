@@ -103,6 +103,9 @@ HAS_MEAN_REFRACTION = bpy.app.version >= (5, 0, 0)
 # Paths pass one transparent surface less than the limit says, shadow rays as many; seen in 5.2, not in 4.3.
 COUNTS_LAST_PASSED = bpy.app.version >= (5, 0, 0)
 
+# The lens of orthographic cameras is where clipping starts, from where focus is measured; seen in 3.4, not in 4.3.
+FOCUSES_FROM_CLIP_START = bpy.app.version < (4, 0, 0)
+
 # The vector pass has the motion of the background; seen in 5.2, not in 4.3.
 BACKGROUND_MOVES = bpy.app.version >= (5, 0, 0)
 

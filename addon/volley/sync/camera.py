@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .. import abi
+from .. import abi, compat
 from . import motion, panorama
 from .matrix import rows12
 
@@ -243,6 +243,14 @@ def view_camera_zoom_factor(view_camera_zoom):
     return ((2.0 ** 0.5 + view_camera_zoom / 50.0) ** 2) / 4.0
 
 
+def _thin_lens(lens):
+    """The radius of the aperture and the distance of focus, as seen from where the camera stands."""
+    if not (lens.is_ortho and compat.FOCUSES_FROM_CLIP_START):
+        return lens.aperture_radius, lens.focus_distance
+    focus_distance = lens.clip_start + lens.focus_distance
+    return lens.aperture_radius * focus_distance / lens.focus_distance, focus_distance
+
+
 def send(scene, keys, shutter=None):
     """Give the camera to the library; equal keys are sent as one. shutter: as motion.Shutter, None for no
     blur."""
@@ -255,11 +263,12 @@ def send(scene, keys, shutter=None):
     kind = abi.CameraType.ORTHOGRAPHIC if lens.is_ortho else abi.CameraType.PERSPECTIVE
     shape = {"type": kind, **dict(lens.panorama), **dict(lens.stereo)}
     shutter = shutter or motion.Shutter(0.0, 0.0, None)
+    aperture_radius, focus_distance = _thin_lens(lens)
     scene.set_camera(
         transforms, windows, shutter.curve, **shape,
         blade_count=lens.blade_count, clip_start=lens.clip_start,
         clip_end=max(lens.clip_end, lens.clip_start * (1.0 + 1e-5)),
-        aperture_radius=lens.aperture_radius, focus_distance=lens.focus_distance,
+        aperture_radius=aperture_radius, focus_distance=focus_distance,
         blade_rotation=lens.blade_rotation, aperture_ratio=lens.aperture_ratio,
         shutter_time=shutter.length, row_delay=shutter.row_delay)
 
