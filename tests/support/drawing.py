@@ -3,11 +3,11 @@
 
 
 class Layout:
-    """Stands for a layout: notes nodes that are offered, properties and operators that are shown, takes every
-    other call. Layouts made of it share its notes."""
+    """Stands for a layout: notes nodes that are offered, properties, operators and sockets of nodes that are shown,
+    takes every other call. Layouts made of it share its notes."""
 
     def __init__(self, notes=None):
-        self.nodes, self.properties, self.operators = notes or ([], {}, [])
+        self.nodes, self.properties, self.operators, self.sockets = notes or ([], {}, [], [])
         self.operator_context = 'INVOKE_DEFAULT'
         self.use_property_split = self.use_property_decorate = False
 
@@ -22,12 +22,15 @@ class Layout:
         self.properties[name] = {"is_split": self.use_property_split, "has_dot": self.use_property_decorate,
                                  **options}
 
+    def template_node_view(self, _tree, _node, socket):
+        self.sockets.append(socket)
+
     def __getattr__(self, name):
         return self._part
 
     def _part(self, *_, **__):
         """A row, column or the like, which has its parent's style."""
-        part = Layout((self.nodes, self.properties, self.operators))
+        part = Layout((self.nodes, self.properties, self.operators, self.sockets))
         part.use_property_split, part.use_property_decorate = self.use_property_split, self.use_property_decorate
         return part
 

@@ -134,6 +134,16 @@ def _ends(tree, path=()):
     return inner + own
 
 
+def output_socket(tree, name):
+    """The socket of that name whose link is followed, be its output in a group; where none is linked, that of an
+    output that counts, None without any."""
+    ends = _ends(tree)
+    linked = _end_sockets(ends, tree_links.TreeLinks()).get(name)
+    if linked is not None:
+        return linked[0]
+    return next((socket for end, _ in reversed(ends) for socket in end.inputs if socket.identifier == name), None)
+
+
 def _is_entered(node, path):
     """Whether a node on a path is a group in which nodes work by themselves, not by what is linked to it."""
     return node.type == 'GROUP' and not node.mute and node.node_tree is not None and len(path) < MAX_GROUPS

@@ -3,6 +3,7 @@
 
 from bpy.types import Panel
 
+from ..sync.flatten import output_socket
 from .panel import NodeEditorPanel, VolleyPanel, column_of, draw_light_group, prop_if_present
 
 
@@ -36,14 +37,13 @@ def _draw_surface(panel, data):
 
 
 def _draw_input(layout, tree, name):
-    """What an input of a tree's output is linked to."""
+    """What an input of a tree's output, or of that of a group in it, is linked to."""
     layout.use_property_split = True
-    output = tree.get_output_node('CYCLES') if tree is not None else None
-    socket = output.inputs.get(name) if output is not None else None
+    socket = output_socket(tree, name) if tree is not None else None
     if socket is None:
         layout.label(text="No output node")
     else:
-        layout.template_node_view(tree, output, socket)
+        layout.template_node_view(socket.id_data, socket.node, socket)
 
 
 class _Light(_LightPanel):
