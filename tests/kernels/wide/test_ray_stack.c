@@ -22,8 +22,10 @@ struct stacks {
 static void stacks_make(struct stacks *s, uint32_t capacity) {
     struct trc_carver c = {0};
     for (int turn = 0; turn < 2; turn++) {
-        trc_rays_carve(&c, &s->stack, capacity, (struct trc_ray_columns){true, true, true, true});
-        trc_rays_carve(&c, &s->work, capacity, (struct trc_ray_columns){true, true, true, true});
+        trc_rays_carve(&c, &s->stack, capacity,
+                       (struct trc_ray_columns){true, true, true, true, true});
+        trc_rays_carve(&c, &s->work, capacity,
+                       (struct trc_ray_columns){true, true, true, true, true});
         if (turn == 0) {
             s->memory = trc_alloc(c.used, 1);
             assert_non_null(s->memory);

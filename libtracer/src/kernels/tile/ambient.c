@@ -19,7 +19,7 @@ static vvec3 ambient_white(const struct trc_tile *t, const struct arrival *a,
     if (!trc_clamps(t->desc))
         return white;
     /* Before the colour of the surface is in it, as in Cycles. */
-    const vfloat limit = trc_clamp_limit(t->desc, sees_directly(a->depths));
+    const vfloat limit = trc_clamp_limit(t->desc, sees_directly(a->depths)) * split_scale(t, a);
     return v3_scale(white, trc_clamp_factor(v3_mul(a->weight, alpha), limit));
 }
 

@@ -43,10 +43,12 @@ static vuint share_of(const struct trc_tile *t, const struct arrival *a,
     return (vuint)vi_select(first, (vint)word, (vint)before);
 }
 
-/* Appends the lanes' rays to a store. direction, weight factor, pdf (< 0: ideal). */
+/* Appends the lanes' rays to a store. direction, weight factor, pdf (< 0: ideal). scale: that part
+ * of the weight which makes a ray one of two. */
 static void ray_append(struct trc_tile *t, struct trc_ray_store *to, const struct arrival *a,
                        const struct trc_surface *s, const struct trc_lobes *lobes,
-                       const struct trc_bsdf_sample *b, uint32_t material, vmask active) {
+                       const struct trc_bsdf_sample *b, vfloat scale, uint32_t material,
+                       vmask active) {
     const trc_render_desc *desc = t->desc;
     const vmask transparent = b->transparent;
     const vmask straight = vm_andnot(transparent, b->through_portal);
@@ -123,9 +125,11 @@ static void ray_append(struct trc_tile *t, struct trc_ray_store *to, const struc
         path_length = column(t->work.f[TRC_RAY_PATH_LENGTH], a);
         path_length = vf_select(straight, path_length, path_length + arrival_length(a));
     }
+    if (t->scales_clamps)
+        scale = scale * split_scale(t, a);
     const vfloat values[TRC_RAY_FLOATS] = {
-        o.x,      o.y,      o.z, w.x,     w.y, w.z, tmin, tmax,           a->time,    weight.x,
-        weight.y, weight.z, pdf, min_pdf, n.x, n.y, n.z,  indirect_scale, path_length};
+        o.x,      o.y,      o.z, w.x,     w.y, w.z, tmin, tmax,           a->time,     weight.x,
+        weight.y, weight.z, pdf, min_pdf, n.x, n.y, n.z,  indirect_scale, path_length, scale};
     vuint left = vu_set(0), strand[2] = {vu_set(0), vu_set(0)};
     if (t->remembers_left)
         left = (vuint)vi_select(transparent, (vint)word_column(t->work.w[TRC_RAY_LEFT], a),
@@ -140,7 +144,7 @@ static void ray_append(struct trc_tile *t, struct trc_ray_store *to, const struc
 static void ray_push(struct trc_tile *t, const struct arrival *a, const struct trc_surface *s,
                      const struct trc_lobes *lobes, const struct trc_bsdf_sample *b,
                      uint32_t material, vmask active) {
-    ray_append(t, &t->stack, a, s, lobes, b, material, active);
+    ray_append(t, &t->stack, a, s, lobes, b, vf_set(1.0f), material, active);
 }
 
 /* Lanes whose rays are worth tracing: Whitted prunes its tree where a ray would add next to nothing
@@ -279,7 +283,8 @@ static void split(struct trc_tile *t, const struct arrival *a, const struct trc_
         b.weight = v3_scale(b.weight, scale);
         const vmask go = attenuate(t, a, &b, vm_and(chosen, b.valid));
         if (vm_any(go))
-            ray_append(t, i ? &t->later : &t->stack, a, s, lobes, &b, material, go);
+            ray_append(t, i ? &t->later : &t->stack, a, s, lobes, &b, scale * a->chance, material,
+                       go);
     }
 }
 

@@ -200,6 +200,8 @@ static void path_begin(struct trc_tile *t, uint32_t i) {
     vu_store(out->w[TRC_RAY_PARENT] + i, vu_set(0));
     if (t->measures_paths)
         vf_store(out->f[TRC_RAY_PATH_LENGTH] + i, zero);
+    if (t->scales_clamps)
+        vf_store(out->f[TRC_RAY_SPLIT_SCALE] + i, one);
     if (t->remembers_left)
         vu_store(out->w[TRC_RAY_LEFT] + i, vu_set(TRC_NO_HIT));
     if (t->light_passes)

@@ -301,6 +301,8 @@ TRC_INLINE void push(struct trc_tile *t, const struct arrival *a, const struct t
     }
     for (int k = 0; q->lamp[0] && k < 3; k++)
         vf_compress(q->lamp[k] + at, r->lamp, bits);
+    if (q->split_scale)
+        vf_compress(q->split_scale + at, split_scale(t, a), bits);
     if (q->pixel) {
         vf_compress(q->pixel + at, s->pixel, bits);
         vf_compress(q->spread + at, spread_of(r), bits);

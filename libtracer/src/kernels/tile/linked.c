@@ -44,6 +44,8 @@ static void found_push(struct trc_tile *t, const struct arrival *a, vvec3 radian
         vf_compress(q->scaled[k] + at, vf_set(0.0f), bits);
     if (t->light_passes)
         vu_compress(q->share + at, word_column(t->work.w[TRC_RAY_SHARE], a), bits);
+    if (q->split_scale)
+        vf_compress(q->split_scale + at, split_scale(t, a), bits);
     if (q->pixel) { /* the path ends here: nothing says how far its rays go apart */
         vf_compress(q->pixel + at, vf_set(0.0f), bits);
         vf_compress(q->spread + at, vf_set(0.0f), bits);

@@ -42,6 +42,8 @@ enum trc_ray_float {
     TRC_RAY_NZ,             /* normal where it left, as kernels/light/light.h wants it */
     TRC_RAY_INDIRECT_SCALE, /* factor on everything behind the next surface: kernels/lobe/bsdf.h */
     TRC_RAY_PATH_LENGTH, /* from the camera to where it left; of scenes with TRC_FEATURE_SLOPES */
+    TRC_RAY_SPLIT_SCALE, /* factor on its weight by which it is one of two (kernels/tile/bounce.c);
+                            where light is clamped and rays are split */
     TRC_RAY_FLOATS
 };
 enum trc_ray_word {
@@ -61,14 +63,14 @@ enum trc_ray_word {
 
 /* Columns that not every tile has. */
 struct trc_ray_columns {
-    bool path_length, left, share, strands;
+    bool path_length, split_scale, left, share, strands;
 };
 
 struct trc_ray_store {
     uint32_t capacity, count;
-    uint32_t reserved_end; /* rays there may be until the next reserve */
-    float *f[TRC_RAY_FLOATS];
-    uint32_t *w[TRC_RAY_WORDS]; /* NULL: a column that nothing reads */
+    uint32_t reserved_end;      /* rays there may be until the next reserve */
+    float *f[TRC_RAY_FLOATS];   /* NULL: a column that nothing reads */
+    uint32_t *w[TRC_RAY_WORDS]; /* the same */
 };
 
 /* How much of a stack its rays may need. */
@@ -96,9 +98,12 @@ TRC_INLINE void trc_rays_carve(struct trc_carver *c, struct trc_ray_store *r, ui
     r->count = r->reserved_end = 0;
     const bool has_word[TRC_RAY_WORDS - TRC_RAY_LEFT] = {columns.left, columns.share,
                                                          columns.strands, columns.strands};
+    const bool has_float[TRC_RAY_FLOATS - TRC_RAY_PATH_LENGTH] = {columns.path_length,
+                                                                  columns.split_scale};
     /* Vectors are stored whole: vf_compress. */
-    for (int i = 0; i < TRC_RAY_PATH_LENGTH + columns.path_length; i++)
-        r->f[i] = trc_carve(c, (capacity + TRC_WIDTH) * sizeof(float));
+    for (int i = 0; i < TRC_RAY_FLOATS; i++)
+        if (i < TRC_RAY_PATH_LENGTH || has_float[i - TRC_RAY_PATH_LENGTH])
+            r->f[i] = trc_carve(c, (capacity + TRC_WIDTH) * sizeof(float));
     for (int i = 0; i < TRC_RAY_WORDS; i++)
         if (i < TRC_RAY_LEFT || has_word[i - TRC_RAY_LEFT])
             r->w[i] = trc_carve(c, (capacity + TRC_WIDTH) * sizeof(uint32_t));
@@ -123,8 +128,9 @@ TRC_INLINE void trc_rays_append(struct trc_ray_store *r, const vfloat values[TRC
     trc_rays_add(r, (uint32_t)__builtin_popcount(bits));
     for (int k = 0; k < TRC_RAY_PATH_LENGTH; k++)
         vf_compress(r->f[k] + at, values[k], bits);
-    if (r->f[TRC_RAY_PATH_LENGTH])
-        vf_compress(r->f[TRC_RAY_PATH_LENGTH] + at, values[TRC_RAY_PATH_LENGTH], bits);
+    for (int k = TRC_RAY_PATH_LENGTH; k < TRC_RAY_FLOATS; k++)
+        if (r->f[k])
+            vf_compress(r->f[k] + at, values[k], bits);
     for (int k = 0; k < TRC_RAY_LEFT; k++)
         vu_compress(r->w[k] + at, words[k], bits);
     for (int k = TRC_RAY_LEFT; k < TRC_RAY_WORDS; k++)

@@ -33,10 +33,16 @@ TRC_INLINE vint left_before(const struct trc_tile *t, const struct arrival *a) {
     return t->snapshot->lights->linked ? (vint)word_column(t->work.w[TRC_RAY_LEFT], a) : vi_set(-1);
 }
 
+/* What the clamps' limits are to be multiplied by: light of rays that are one of two is clamped as
+ * if they were the only ones, as in Cycles. */
+TRC_INLINE vfloat split_scale(const struct trc_tile *t, const struct arrival *a) {
+    return t->scales_clamps ? column(t->work.f[TRC_RAY_SPLIT_SCALE], a) : vf_set(1.0f);
+}
+
 /* The limit of what rays find by themselves: what one bounce shows is direct light. */
 TRC_INLINE vfloat found_limit(const struct trc_tile *t, const struct arrival *a) {
     const vint depth = (vint)trc_depth_of(a->depths, TRC_DEPTH_ALL_SHIFT);
-    return trc_clamp_limit(t->desc, vi_lt(depth, vi_set(2)));
+    return trc_clamp_limit(t->desc, vi_lt(depth, vi_set(2))) * split_scale(t, a);
 }
 
 /* The rays as lights want them, up to their end. */

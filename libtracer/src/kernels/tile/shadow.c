@@ -19,7 +19,9 @@ static void light_clamp(struct trc_tile *t) {
         const vmask is_direct = vi_eq((vint)trc_depth_of(depths, TRC_DEPTH_ALL_SHIFT), vi_set(0));
         const vint path = vi_load((const int32_t *)q->path + i);
         const vmask shared = vm_and(is_direct, vi_eq(path & single, vi_set(0)));
-        const vfloat limit = trc_clamp_limit(t->desc, is_direct) * vf_select(shared, share, one);
+        vfloat limit = trc_clamp_limit(t->desc, is_direct) * vf_select(shared, share, one);
+        if (q->split_scale)
+            limit = limit * vf_load(q->split_scale + i);
         const vvec3 light = v3(vf_load(q->radiance[0] + i), vf_load(q->radiance[1] + i),
                                vf_load(q->radiance[2] + i));
         const vfloat factor =

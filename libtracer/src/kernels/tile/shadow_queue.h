@@ -33,6 +33,7 @@ struct trc_shadow_store {
     uint32_t *passed;                  /* surfaces that it has come through, or NULL */
     float *pixel;                      /* at what is lit (struct trc_surface), or NULL */
     float *spread;                     /* how much wider it may get per length, or NULL */
+    float *split_scale;                /* as rays have it, or NULL */
     float *lamp[3];                    /* for the Shadow pass, or NULL */
     float *scaled[TRC_SCALED_COLUMNS]; /* those that what is in the way takes from, RGB by RGB */
     uint32_t scaled_count;
@@ -43,11 +44,12 @@ struct trc_shadow_store {
 
 /* Columns that not every picture needs. */
 struct trc_shadow_columns {
-    bool splits;  /* of light passes */
-    bool lamps;   /* of the Shadow pass */
-    bool strands; /* of curves */
-    bool passes;  /* of transparent materials */
-    bool pixels;  /* of those with slopes */
+    bool splits;       /* of light passes */
+    bool lamps;        /* of the Shadow pass */
+    bool strands;      /* of curves */
+    bool passes;       /* of transparent materials */
+    bool pixels;       /* of those with slopes */
+    bool split_scales; /* of clamped light of split rays */
 };
 
 TRC_INLINE void trc_shadows_carve(struct trc_carver *c, struct trc_shadow_store *q,
@@ -72,6 +74,8 @@ TRC_INLINE void trc_shadows_carve(struct trc_carver *c, struct trc_shadow_store 
         q->pixel = trc_carve(c, column);
         q->spread = trc_carve(c, column);
     }
+    if (with.split_scales)
+        q->split_scale = trc_carve(c, column);
     if (with.strands) {
         q->strand_instance = trc_carve(c, column);
         q->strand = trc_carve(c, column);

@@ -1,10 +1,12 @@
 /* A tile from camera rays to film. See kernels/tile/tile.h for how it works. */
 #include "kernels/tile/tile.h"
+#include "kernels/light/clamp.h"
 
 #include <assert.h>
 #include <math.h>
 
 #include "core/core.h"
+#include "kernels/light/clamp.h"
 
 /* ---- clocks: one reading per stage and step ---- */
 
@@ -56,6 +58,7 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc,
     t->measures_paths = features & TRC_FEATURE_SLOPES;
     t->hit_branches = count_branches(desc, snapshot);
     t->splits = desc->integrator == TRC_INTEGRATOR_DISTRIBUTION && snapshot->branch_count > 1;
+    t->scales_clamps = t->splits && trc_clamps(desc);
     /* Whitted's rays may meet a catcher, which splits them before they branch. Of other integrators
      * a sample has two rays at most, and a batch of them half as many samples. Second rays of hits
      * go on by themselves. */
@@ -64,8 +67,8 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc,
     const size_t batch = (trc_column_entries(catchers) + TRC_WIDTH) * sizeof(float);
     const bool splits_light = wants_light_passes(desc);
     const bool curves = features & TRC_FEATURE_CURVES;
-    const struct trc_ray_columns columns = {t->measures_paths, t->remembers_left, splits_light,
-                                            curves};
+    const struct trc_ray_columns columns = {t->measures_paths, t->scales_clamps, t->remembers_left,
+                                            splits_light, curves};
     trc_rays_carve(&c, &t->stack, t->ray_room.capacity, columns);
     trc_rays_carve(&c, &t->work, t->ray_room.capacity, columns);
     if (t->splits)
@@ -87,7 +90,8 @@ static size_t tile_carve(struct trc_tile *t, const trc_render_desc *desc,
                                                   .lamps = desc->passes >> TRC_PASS_SHADOW & 1,
                                                   .strands = curves,
                                                   .passes = features & TRC_FEATURE_TRANSPARENCY,
-                                                  .pixels = features & TRC_FEATURE_SHADOW_SLOPES});
+                                                  .pixels = features & TRC_FEATURE_SHADOW_SLOPES,
+                                                  .split_scales = t->scales_clamps});
     if (curves)
         t->left = trc_carve(&c, TRC_BUNDLE * sizeof *t->left);
     t->keys = trc_carve(&c, TRC_SHADOW_COLUMN * sizeof *t->keys);

@@ -102,6 +102,7 @@ struct trc_tile {
     bool looks_back;            /* rays go through surfaces: kernels/trace/spawn.h */
     bool remembers_left;        /* rays know what they left: they look back, or lights are linked */
     bool measures_paths;        /* rays know how long their path is */
+    bool scales_clamps;         /* rays know by what part they are one of two */
     bool camera_common;         /* what the camera sees starts at one point */
     uint32_t packet_size;       /* 1..TRC_PACKET_SIZE */
     uint32_t bundle;            /* packets of a bundle at most, where rays stay together */
