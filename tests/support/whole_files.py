@@ -34,6 +34,7 @@ def open_file(path, size, has_lens_blur=False, has_motion_blur=False):
     render.use_compositing = render.use_sequencer = render.use_stamp = False
     scenes.set_file_format(render.image_settings, 'OPEN_EXR')
     render.image_settings.color_depth, render.image_settings.color_mode = '32', 'RGBA'
+    scene.display_settings.display_device = 'sRGB'  # files of Blender 2.4 have one without 'Raw'
     scene.view_settings.view_transform, render.dither_intensity = 'Raw', 0.0
     if scene.camera is None:
         _add_camera()
