@@ -1,6 +1,5 @@
 /* A tile from camera rays to film. See kernels/tile/tile.h for how it works. */
 #include "kernels/tile/tile.h"
-#include "kernels/light/clamp.h"
 
 #include <assert.h>
 #include <math.h>
