@@ -117,10 +117,8 @@ void trc_facets_finish_twin(struct trc_lobe *lobe, const struct trc_lobe *of) {
     lobe->mean_alpha = of->mean_alpha;
     lobe->cos_o = of->cos_o;
     lobe->g1_o = of->g1_o;
-    lobe->pdf_scale = of->pdf_scale;
+    lobe->pdf_scale = lobe->distribution == TRC_LOBE_BECKMANN ? of->pdf_scale : ggx_pdf_scale(lobe);
     set_ideal(lobe);
-    if (lobe->distribution != TRC_LOBE_BECKMANN)
-        lobe->pdf_scale = ggx_pdf_scale(lobe);
 }
 
 void trc_facets_set_multiple(struct trc_lobe *lobe, vvec3 wo, vvec3 per_bounce, bool is_first) {
