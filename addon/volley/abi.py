@@ -28,7 +28,7 @@ SUMS_END = 194
 VERSION_MAJOR = 0
 VERSION_MINOR = 1
 VERSION_PATCH = 0
-ABI_VERSION = 9
+ABI_VERSION = 10
 
 
 class StatusCode(IntEnum):
@@ -921,7 +921,8 @@ class RenderDesc(Structure):
                 ("mist_falloff", c_float), ("cryptomattes", c_uint32), ("cryptomatte_depth", c_uint32),
                 ("aov_value_count", c_uint32), ("aov_color_count", c_uint32),
                 ("light_group_count", c_uint32), ("denoise", c_uint32), ("sample_offset", c_uint32),
-                ("sample_subset", c_uint32), ("pass_flags", c_uint32), ("guides", c_uint32))
+                ("sample_subset", c_uint32), ("pass_flags", c_uint32), ("guides", c_uint32),
+                ("extra_samples", c_float))
 
 
 class RenderProgress(Structure):

@@ -1,10 +1,9 @@
 /* Adaptive sampling: the mean does not depend on who stops when, counts, determinism. */
-#include "fixture.h"
+#include "counted_picture.h"
 
 #include <float.h>
 #include <stdbool.h>
 #include <stdio.h>
-#include <stdlib.h>
 
 #include "model/adaptive.h"
 #include "rng.h"
@@ -18,21 +17,9 @@ enum { SIDE = 16, PIXELS = SIDE * SIDE, MOST = 512, TRIALS = 600 };
 #define RARE_MEAN (0.02 + 0.01 * 20.0)
 static float rare_sample(struct rng *r) { return rng_unit(r) < RARE ? 20.02f : 0.02f; }
 
-struct moments {
-    double sum, sum2, samples;
-    uint64_t count;
-};
-static void moments_add(struct moments *m, double mean, double samples) {
-    m->sum += mean;
-    m->sum2 += mean * mean;
-    m->samples += samples;
-    m->count++;
-}
 /* Distance of the mean from the truth in standard errors. */
 static double moments_score(const struct moments *m, double truth) {
-    const double mean = m->sum / (double)m->count;
-    const double variance = m->sum2 / (double)m->count - mean * mean;
-    return (mean - truth) / sqrt(variance / (double)m->count);
+    return (moments_mean(m) - truth) / sqrt(moments_variance(m));
 }
 
 static trc_render_desc square_desc(float threshold, uint32_t min_samples) {
@@ -150,13 +137,6 @@ static void neighbours(void **state) {
 
 /* ---- renders ---- */
 
-enum { WIDTH = 70, HEIGHT = 50, FRAME = WIDTH * HEIGHT };
-
-struct picture {
-    float combined[4 * FRAME], counts[FRAME];
-    trc_render_progress progress;
-};
-
 static trc_render_desc picture_desc(float threshold) {
     trc_render_desc desc = default_render_desc(WIDTH, HEIGHT, 256);
     desc.passes = UINT64_C(1) << TRC_PASS_SAMPLE_COUNT;
@@ -165,31 +145,17 @@ static trc_render_desc picture_desc(float threshold) {
     return desc;
 }
 
-static struct picture *draw(trc_scene scene, const trc_render_desc *desc) {
-    struct picture *p = malloc(sizeof *p);
-    trc_render render = 0;
-    assert_non_null(p);
-    assert_int_equal(trc_render_start(scene, desc, &render), TRC_OK);
-    assert_int_equal(trc_render_wait(render, -1.0), TRC_OK);
-    p->progress = (trc_render_progress){.struct_size = sizeof p->progress};
-    assert_int_equal(trc_render_poll(render, &p->progress), TRC_OK);
-    assert_int_equal(trc_render_read(render, TRC_PASS_COMBINED, p->combined, 4 * FRAME), TRC_OK);
-    assert_int_equal(trc_render_read(render, TRC_PASS_SAMPLE_COUNT, p->counts, FRAME), TRC_OK);
-    assert_int_equal(trc_render_destroy(render), TRC_OK);
-    return p;
-}
-
 /* A threshold that nothing reaches, and one that needs more samples than there are, change no
  * bit. */
 static void unreached(void **state) {
     const trc_scene scene = *(const trc_scene *)*state;
     trc_render_desc desc = picture_desc(0.0f);
-    struct picture *plain = draw(scene, &desc);
+    struct picture *plain = picture_draw(scene, &desc);
     desc.noise_threshold = 1e-12f;
-    struct picture *strict = draw(scene, &desc);
+    struct picture *strict = picture_draw(scene, &desc);
     desc.noise_threshold = 0.1f;
     desc.min_samples = 256;
-    struct picture *few = draw(scene, &desc);
+    struct picture *few = picture_draw(scene, &desc);
     uint32_t spared = 0;
     for (uint32_t i = 0; i < FRAME; i++) {
         assert_true(plain->counts[i] == 256.0f && few->counts[i] == 256.0f);
@@ -212,9 +178,9 @@ static void counts(void **state) {
     for (uint32_t progressive = 0; progressive < 2; progressive++) {
         trc_render_desc desc = picture_desc(0.01f);
         desc.progressive = progressive;
-        struct picture *one = draw(scene, &desc);
+        struct picture *one = picture_draw(scene, &desc);
         desc.thread_count = 5;
-        struct picture *five = draw(scene, &desc);
+        struct picture *five = picture_draw(scene, &desc);
         assert_memory_equal(one->combined, five->combined, sizeof one->combined);
         assert_memory_equal(one->counts, five->counts, sizeof one->counts);
         assert_true(one->progress.fraction == 1.0f && one->progress.samples_done == 256);
@@ -241,21 +207,12 @@ static void same_mean(void **state) {
             desc.seed = seed;
             if (kind)
                 desc.sample_count = 64;
-            struct picture *p = draw(scene, &desc);
-            double mean = 0.0, samples = 0.0;
-            for (uint32_t i = 0; i < FRAME; i++) {
-                mean += (double)p->combined[4 * i + 1] / FRAME;
-                samples += (double)p->counts[i] / FRAME;
-            }
-            moments_add(kind ? &fixed : &adaptive, mean, samples);
+            struct picture *p = picture_draw(scene, &desc);
+            moments_add_picture(kind ? &fixed : &adaptive, p);
             free(p);
         }
     }
-    const double a = adaptive.sum / SEEDS, f = fixed.sum / SEEDS;
-    const double variance = (adaptive.sum2 / SEEDS - a * a + fixed.sum2 / SEEDS - f * f) / SEEDS;
-    printf("mean %.6f with %.1f samples, %.6f with 64: %.2f standard errors (%.2e of the mean)\n",
-           a, adaptive.samples / SEEDS, f, (a - f) / sqrt(variance), sqrt(variance) / f);
-    assert_true(fabs(a - f) < 4.0 * sqrt(variance));
+    moments_require_same(&adaptive, &fixed);
 }
 
 /* A veil over all of the picture that lets half through: every sample that counts meets it, so it

@@ -8,6 +8,6 @@
 
 /* Raised whenever a descriptor, an enumerator or a function changes incompatibly. A caller compares
  * it with trc_abi_version() before any other call. */
-#define TRC_ABI_VERSION 9
+#define TRC_ABI_VERSION 10
 
 #endif

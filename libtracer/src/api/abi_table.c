@@ -759,6 +759,7 @@ const struct trc_abi_entry trc_abi_entries[] = {
     {"trc_render_desc.cryptomatte_depth", offsetof(trc_render_desc, cryptomatte_depth)},
     {"trc_render_desc.cryptomattes", offsetof(trc_render_desc, cryptomattes)},
     {"trc_render_desc.denoise", offsetof(trc_render_desc, denoise)},
+    {"trc_render_desc.extra_samples", offsetof(trc_render_desc, extra_samples)},
     {"trc_render_desc.film_exposure", offsetof(trc_render_desc, film_exposure)},
     {"trc_render_desc.film_transparent", offsetof(trc_render_desc, film_transparent)},
     {"trc_render_desc.film_transparent_glass", offsetof(trc_render_desc, film_transparent_glass)},

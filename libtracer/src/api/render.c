@@ -52,6 +52,7 @@ static trc_status check_sampling(const trc_render_desc *desc) {
     TRC_TRY(trc_check_float(desc->clamp_indirect, 0.0f, FLT_MAX, "clamp_indirect"));
     TRC_TRY(trc_check_float(desc->noise_threshold, 0.0f, FLT_MAX, "noise_threshold"));
     TRC_TRY(trc_check_count(desc->min_samples, 0, MAX_SAMPLES, "min_samples"));
+    TRC_TRY(trc_check_float(desc->extra_samples, 0.0f, 1.0f, "extra_samples"));
     TRC_TRY(trc_check_enum(desc->assembly, TRC_ASSEMBLY_NONE + 1, "assembly"));
     TRC_TRY(check_packet_size(desc->packet_size));
     TRC_TRY(trc_check_enum(desc->sampler, TRC_SAMPLER_BLUE_NOISE + 1, "sampler"));

@@ -41,10 +41,11 @@ trc_status trc_film_add_halves(const trc_render_desc *desc, struct trc_film *fil
     /* Pixels that stop at a power of two, or are shown at one, are halved there. */
     const bool stops = desc->noise_threshold > 0.0f || desc->progressive;
     film->half_count = stops || desc->sample_count < 2 ? 0 : desc->sample_count / 2;
+    film->extra_begin = desc->extra_samples > 0.0f ? desc->sample_count : 0;
     film->halves = trc_alloc_zeroed(pixels, sizeof *film->halves);
     bool ok = film->halves != NULL;
     if (!has_clean_film(desc))
-        return ok ? TRC_OK : trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for reconstruction");
+        return ok ? TRC_OK : trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for halves of samples");
     for (uint32_t pass = 0; ok && pass < TRC_SUM_COUNT; pass++) {
         if (!is_reconstructed(desc, pass))
             continue;

@@ -6,6 +6,7 @@
 
 #include "core/checks.h"
 #include "core/core.h"
+#include "model/extra.h"
 
 trc_status trc_film_check_budget(uint32_t width, uint32_t height, uint64_t pixel_bytes,
                                  uint64_t other_bytes) {
@@ -45,7 +46,7 @@ trc_status trc_film_create(const trc_render_desc *desc, struct trc_film *film) {
                             .is_transparent = desc->film_transparent,
                             .guides = desc->guides,
                             .matte_count = trc_film_matte_count(desc),
-                            .matte_units = trc_matte_units(desc->sample_count),
+                            .matte_units = trc_matte_units(trc_extra_most_samples(desc)),
                             .sample_offset = desc->sample_offset};
     TRC_TRY(trc_film_check_budget(made.width, made.height, trc_film_pixel_bytes(desc), 0));
     const size_t pixels = (size_t)made.width * made.height;

@@ -22,8 +22,8 @@ trc_status trc_film_create(const trc_render_desc *desc, struct trc_film *film);
 /* Takes the memory for shadow catchers. TRC_ERROR_OUT_OF_MEMORY. */
 trc_status trc_film_add_catchers(struct trc_film *film);
 
-/* Takes the memory that reconstruction needs of the film, after the memory for shadow catchers;
- * desc is resolved. TRC_ERROR_OUT_OF_MEMORY. (film/denoise.c) */
+/* Takes the memory that reconstruction and extra samples need of the film, after the memory for
+ * shadow catchers; desc is resolved. TRC_ERROR_OUT_OF_MEMORY. (film/denoise.c) */
 trc_status trc_film_add_halves(const trc_render_desc *desc, struct trc_film *film);
 
 /* Bytes of that and of the filter for each pixel. */

@@ -32,7 +32,7 @@ void trc_film_keep_half(const struct trc_film *film, size_t pixel, const double 
         store_float(&half->light[c], (float)light);
     }
     float *feature = half->features;
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; i < 3 && film->sums[passes[i]]; i++) /* all or none are there */
         for (uint32_t k = 0; k < trc_pass_info_of(passes[i])->sums; k++)
             *feature++ =
                 (float)film->sums[passes[i]][trc_pass_info_of(passes[i])->sums * pixel + k];

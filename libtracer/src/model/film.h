@@ -41,10 +41,11 @@ struct trc_caught {
 /* So many doubles. */
 #define TRC_CAUGHT_CHANNELS (sizeof(struct trc_caught) / sizeof(double))
 
-/* Sums over the first half of a pixel's samples, by which reconstruction knows noise. */
+/* Sums over the first half of a pixel's samples, by which reconstruction and extra samples know
+ * noise. */
 struct trc_half {
     float light[4];    /* of Combined; with the light of shadow catchers */
-    float features[7]; /* of the passes for denoisers: albedo, normal, depth */
+    float features[7]; /* of the passes for denoisers: albedo, normal, depth; 0 without them */
     uint32_t count;    /* of the samples, below that of all; 0: there is no half yet */
 };
 
@@ -67,9 +68,10 @@ struct trc_film {
     struct trc_caught *caught; /* width * height, or NULL: the scene has no shadow catchers */
     bool shows_shadows;        /* their shadows are a pass, so Combined is without them */
     bool is_transparent;       /* trc_render_desc.film_transparent */
-    struct trc_half *halves;   /* width * height, or NULL: no reconstruction */
+    struct trc_half *halves;   /* width * height, or NULL: nobody asks for noise */
     uint32_t half_count;       /* samples of the first half; 0: the largest power of two below
                                   their count */
+    uint32_t extra_begin;      /* where extra samples begin, which double a pixel's; 0: never */
     uint32_t sample_offset;    /* samples of a pixel before those of this film, to tell halves by */
     struct trc_clean_film clean;
     uint32_t guides;   /* trc_render_desc.guides */
@@ -86,14 +88,23 @@ static inline atomic_uint *trc_film_sequence(const struct trc_film *film, uint32
 /* Whether a pixel's first half of samples ends with so many of this film. */
 static inline bool trc_film_ends_half(const struct trc_film *film, uint32_t count) {
     count += film->sample_offset;
-    return film->half_count ? count == film->half_count : count && !(count & (count - 1));
+    if (!film->half_count)
+        return count && !(count & (count - 1));
+    if (!film->extra_begin || count <= film->half_count)
+        return count == film->half_count;
+    const uint32_t times = count / film->extra_begin;
+    return times && count % film->extra_begin == 0 && !(times & (times - 1));
 }
 
 /* The least count above this one with which a first half ends, UINT32_MAX where there is none. */
 static inline uint32_t trc_film_next_half(const struct trc_film *film, uint32_t count) {
     const uint32_t all = count + film->sample_offset;
-    const uint64_t power = all ? UINT64_C(2) << (31 - __builtin_clz(all)) : 1;
-    const uint64_t next = film->half_count ? film->half_count : power;
+    uint64_t next = film->half_count;
+    if (!next)
+        next = all ? UINT64_C(2) << (31 - __builtin_clz(all)) : 1;
+    else if (film->extra_begin && next <= all)
+        for (next = film->extra_begin; next <= all;)
+            next *= 2;
     return next > all && next < UINT32_MAX ? (uint32_t)next - film->sample_offset : UINT32_MAX;
 }
 

@@ -8,6 +8,7 @@
 
 #include "model/adaptive.h"
 #include "model/denoise.h"
+#include "model/extra.h"
 #include "model/film.h"
 #include "model/snapshot.h"
 #include "tracer/tracer.h"
@@ -33,7 +34,10 @@ struct trc_tile_job {
     const float *filter_table;     /* model/filter.h */
     struct trc_film *film;
     struct trc_adaptive *adaptive; /* NULL: every pixel gets every sample */
-    uint32_t x, y, width, height;  /* in the crop, pixels */
+    /* NULL, or the samples are extra ones, of the pixels that have this level or a higher one. */
+    const struct trc_extra *extra;
+    uint32_t extra_level;
+    uint32_t x, y, width, height; /* in the crop, pixels */
     uint32_t sample_begin, sample_end;
     void *memory;                  /* tile_memory_bytes(...) bytes, 64-byte aligned, one thread's */
     const atomic_uint *cancel;     /* non-zero: return soon, the tile's pixels keep whole samples */

@@ -31,6 +31,7 @@ struct trc_render_state {
     const struct trc_kernels *kernels;
     struct trc_film film;
     struct trc_adaptive adaptive; /* without pixels: off */
+    struct trc_extra extra;       /* without levels: off */
     struct trc_denoise denoise;   /* without film: off */
     struct trc_schedule schedule;
     uint32_t *sampler_table;
@@ -49,7 +50,9 @@ struct trc_render_state {
     uint32_t tiles_done;    /* with all their batches */
     uint64_t denoise_done;  /* tiles of all steps of reconstruction */
     uint64_t pixel_samples_done;
-    uint32_t merged_count; /* samples that parts brought */
+    uint64_t extra_planned; /* extra samples of all pixels */
+    bool is_planned;        /* that and the levels are there */
+    uint32_t merged_count;  /* samples that parts brought */
     struct trc_tile_counts counts;
     uint32_t version, state;
     uint32_t running_count; /* threads that have not ended, and the starter */
@@ -74,6 +77,9 @@ trc_render_desc trc_render_resolve(const trc_render_desc *desc) {
     }
     if (!r.sample_subset)
         r.sample_subset = r.sample_count - r.sample_offset;
+    if (r.progressive || r.noise_threshold > 0.0f || trc_film_is_part(&r) ||
+        r.sample_count < TRC_EXTRA_MIN_SAMPLES)
+        r.extra_samples = 0.0f;
     if (!r.thread_count)
         r.thread_count = trc_thread_processor_count();
     if (r.max_shadow_depth == UINT32_MAX)
@@ -102,8 +108,9 @@ static bool await_former_batch(struct trc_render_state *render, uint32_t tile, u
     return !atomic_load(&render->cancel);
 }
 
+/* pixels: that the job took samples of. */
 static void add_counts(struct trc_render_state *render, const struct trc_tile_job *job,
-                       bool complete) {
+                       uint32_t pixels, bool complete) {
     const struct trc_tile_counts *c = &job->counts;
     pthread_mutex_lock(&render->lock);
     render->counts.rays_camera += c->rays_camera;
@@ -114,11 +121,28 @@ static void add_counts(struct trc_render_state *render, const struct trc_tile_jo
     render->counts.seconds_trace += c->seconds_trace;
     render->counts.seconds_shade += c->seconds_shade;
     render->counts.seconds_other += c->seconds_other;
-    if (complete) {
-        render->pixel_samples_done +=
-            (uint64_t)job->width * job->height * (job->sample_end - job->sample_begin);
-    }
+    if (complete)
+        render->pixel_samples_done += (uint64_t)pixels * (job->sample_end - job->sample_begin);
     pthread_mutex_unlock(&render->lock);
+}
+
+/* Finds who gets extra samples, once all tiles have theirs. */
+static void plan_extra(struct trc_render_state *render) {
+    const uint64_t planned = trc_extra_plan(&render->extra, &render->film);
+    pthread_mutex_lock(&render->lock);
+    render->extra_planned = planned;
+    render->is_planned = true;
+    pthread_cond_broadcast(&render->tile_done);
+    pthread_mutex_unlock(&render->lock);
+}
+
+/* Waits for the plan of extra samples; false if the render is cancelled. */
+static bool await_plan(struct trc_render_state *render) {
+    pthread_mutex_lock(&render->lock);
+    while (!render->is_planned && !atomic_load(&render->cancel))
+        pthread_cond_wait(&render->tile_done, &render->lock);
+    pthread_mutex_unlock(&render->lock);
+    return !atomic_load(&render->cancel);
 }
 
 static void finish_item(struct trc_render_state *render, uint32_t tile, uint32_t batch) {
@@ -132,15 +156,24 @@ static void finish_item(struct trc_render_state *render, uint32_t tile, uint32_t
            render->batch_tiles[render->lowest_batch] == schedule->tile_count) {
         render->lowest_batch++;
     }
+    const bool is_base = batch == 0 && render->lowest_batch > 0;
     render->version++;
     pthread_cond_broadcast(&render->tile_done);
     pthread_mutex_unlock(&render->lock);
+    if (is_base && render->extra.levels)
+        plan_extra(render);
 }
 
-/* Samples [begin, end) of a tile, counted from the render's first; false if the render was
- * cancelled before the end. */
+/* Samples of a tile. */
+struct sample_range {
+    uint32_t begin, end; /* counted from the render's first */
+    uint32_t level;      /* 0: of all pixels, else of those with that level of extra samples */
+    uint32_t pixels;     /* how many these are */
+};
+
+/* False if the render was cancelled before the end. */
 static bool render_samples(struct trc_render_state *render, const struct trc_tile_area *area,
-                           uint32_t begin, uint32_t end, void *memory) {
+                           struct sample_range range, void *memory) {
     struct trc_tile_job job = {
         .snapshot = render->snapshot,
         .desc = &render->desc,
@@ -148,18 +181,24 @@ static bool render_samples(struct trc_render_state *render, const struct trc_til
         .filter_table = render->filter_table,
         .film = &render->film,
         .adaptive = render->adaptive.pixels ? &render->adaptive : NULL,
+        .extra = range.level ? &render->extra : NULL,
+        .extra_level = range.level,
         .x = area->x,
         .y = area->y,
         .width = area->width,
         .height = area->height,
-        .sample_begin = render->schedule.sample_begin + begin,
-        .sample_end = render->schedule.sample_begin + end,
+        .sample_begin = render->schedule.sample_begin + range.begin,
+        .sample_end = render->schedule.sample_begin + range.end,
         .memory = memory,
         .cancel = &render->cancel,
     };
     render->kernels->tile_render(&job);
     const bool complete = !atomic_load(&render->cancel);
-    add_counts(render, &job, complete);
+    if (render->extra.levels && !range.level)
+        *trc_extra_tile_rays(&render->extra, area->x, area->y) +=
+            job.counts.rays_camera + job.counts.rays_shadow + job.counts.rays_reflection +
+            job.counts.rays_refraction;
+    add_counts(render, &job, range.pixels, complete);
     return complete;
 }
 
@@ -167,11 +206,19 @@ static bool render_samples(struct trc_render_state *render, const struct trc_til
 static bool render_item(struct trc_render_state *render, uint32_t tile, uint32_t batch,
                         void *memory) {
     const struct trc_schedule *schedule = &render->schedule;
-    const struct trc_tile_area area = trc_schedule_tile(schedule, tile);
+    const struct trc_tile_area a = trc_schedule_tile(schedule, tile);
     const uint32_t end = trc_schedule_batch_begin(schedule, batch + 1);
-    for (uint32_t i = trc_schedule_batch_begin(schedule, batch); i < end; i += SAMPLES_PER_JOB) {
-        const uint32_t next = end - i < SAMPLES_PER_JOB ? end : i + SAMPLES_PER_JOB;
-        if (!render_samples(render, &area, i, next, memory))
+    struct sample_range range = {.begin = trc_schedule_batch_begin(schedule, batch),
+                                 .level = schedule->extra_batches ? batch : 0,
+                                 .pixels = a.width * a.height};
+    if (range.level) {
+        if (!await_plan(render))
+            return false;
+        range.pixels = trc_extra_pixels(&render->extra, a.x, a.y, a.width, a.height, range.level);
+    }
+    for (; range.pixels && range.begin < end; range.begin = range.end) {
+        range.end = end - range.begin < SAMPLES_PER_JOB ? end : range.begin + SAMPLES_PER_JOB;
+        if (!render_samples(render, &a, range, memory))
             return false;
     }
     return true;
@@ -189,7 +236,8 @@ static bool render_item_adaptive(struct trc_render_state *render, uint32_t tile,
         const uint32_t stage = trc_adaptive_next_stage(adaptive, i);
         uint32_t next = end - i < SAMPLES_PER_JOB ? end : i + SAMPLES_PER_JOB;
         next = next < stage ? next : stage;
-        if (!render_samples(render, &a, i, next, memory))
+        const struct sample_range range = {i, next, 0, a.width * a.height};
+        if (!render_samples(render, &a, range, memory))
             return false;
         if (next == stage)
             trc_adaptive_update(adaptive, a.x, a.y, a.width, a.height, stage);
@@ -315,6 +363,10 @@ static bool is_adaptive(const trc_render_desc *desc) {
     return desc->noise_threshold > 0.0f && !trc_film_is_part(desc);
 }
 
+static bool has_halves(const trc_render_desc *desc) {
+    return desc->denoise || desc->extra_samples > 0.0f;
+}
+
 /* Whether all parts of a frame can be had at once, before the first is taken. */
 static trc_status check_memory(const trc_render_desc *desc, bool has_catchers,
                                uint64_t worker_bytes) {
@@ -323,14 +375,18 @@ static trc_status check_memory(const trc_render_desc *desc, bool has_catchers,
         pixel_bytes += sizeof(struct trc_caught);
     if (is_adaptive(desc))
         pixel_bytes += sizeof(struct trc_adaptive_pixel);
-    if (desc->denoise)
+    if (desc->extra_samples > 0.0f)
+        pixel_bytes += TRC_EXTRA_PIXEL_BYTES;
+    if (has_halves(desc))
         pixel_bytes += trc_film_half_bytes(desc, has_catchers);
     const uint64_t tiles =
         (uint64_t)trc_film_tiles(desc->crop_width) * trc_film_tiles(desc->crop_height);
+    const uint64_t tile_bytes =
+        3 * sizeof(uint32_t) + (desc->extra_samples > 0.0f ? TRC_EXTRA_TILE_BYTES : 0);
     const uint64_t workers = desc->thread_count < tiles ? desc->thread_count : tiles;
     /* A tile has its place in the order, its batches and a number in the film. */
     return trc_film_check_budget(desc->crop_width, desc->crop_height, pixel_bytes,
-                                 workers * worker_bytes + tiles * 3 * sizeof(uint32_t) +
+                                 workers * worker_bytes + tiles * tile_bytes +
                                      TRC_SOBOL_TABLE_BYTES);
 }
 
@@ -351,7 +407,9 @@ static trc_status take_film(struct trc_render_state *render, bool has_catchers) 
         TRC_TRY(trc_film_add_catchers(&render->film));
     if (is_adaptive(desc))
         TRC_TRY(trc_adaptive_create(desc, &render->adaptive));
-    if (desc->denoise)
+    if (desc->extra_samples > 0.0f)
+        TRC_TRY(trc_extra_create(desc, &render->extra));
+    if (has_halves(desc))
         TRC_TRY(trc_film_add_halves(desc, &render->film));
     if (desc->denoise == TRC_DENOISE_FINAL && !trc_film_is_part(desc))
         TRC_TRY(trc_denoise_create(&render->film, &render->denoise));
@@ -392,6 +450,7 @@ static void free_memory(struct trc_render_state *render) {
     trc_free(render->sampler_table);
     trc_schedule_destroy(&render->schedule);
     trc_adaptive_destroy(&render->adaptive);
+    trc_extra_destroy(&render->extra);
     trc_denoise_destroy(&render->denoise);
     trc_film_destroy(&render->film);
     trc_snapshot_release(render->snapshot);
@@ -464,7 +523,9 @@ trc_status trc_render_state_start(struct trc_snapshot *snapshot, const trc_rende
 
 trc_status trc_render_state_merge(const trc_render_desc *desc, bool has_catchers,
                                   struct trc_render_state **render_out) {
-    TRC_TRY(create(NULL, desc, has_catchers, render_out));
+    trc_render_desc own = *desc;
+    own.extra_samples = 0.0f; /* parts have none */
+    TRC_TRY(create(NULL, &own, has_catchers, render_out));
     struct trc_render_state *render = *render_out;
     const struct trc_schedule *schedule = &render->schedule;
     atomic_store(&render->next_item, (uint64_t)schedule->batch_count * schedule->tile_count);
@@ -602,15 +663,26 @@ void trc_render_state_wait(struct trc_render_state *render, double timeout_secon
     pthread_mutex_unlock(&render->lock);
 }
 
+/* Under the lock: extra samples are their share, however many they are. */
+static double fraction_of(const struct trc_render_state *render) {
+    const struct trc_schedule *schedule = &render->schedule;
+    const double all = (double)schedule->width * schedule->height * schedule->sample_count;
+    const double done = (double)render->pixel_samples_done, share = (double)render->extra.share;
+    double extra = 0.0;
+    if (render->is_planned)
+        extra = render->extra_planned ? (done - all) / (double)render->extra_planned : 1.0;
+    return (fmin(done / all, 1.0) + share * extra) / (1.0 + share);
+}
+
 void trc_render_state_poll(struct trc_render_state *render, trc_render_progress *progress_out) {
     const struct trc_schedule *schedule = &render->schedule;
-    const double pixel_samples =
-        (double)schedule->width * schedule->height * schedule->sample_count;
     trc_render_progress p = {.struct_size = sizeof p, .tile_count = schedule->tile_count};
     pthread_mutex_lock(&render->lock);
     p.state = render->state;
-    p.fraction = (float)((double)render->pixel_samples_done / pixel_samples);
+    p.fraction = (float)fraction_of(render);
     p.samples_done = trc_schedule_batch_begin(schedule, render->lowest_batch);
+    if (p.samples_done > schedule->sample_count) /* some pixels have more */
+        p.samples_done = schedule->sample_count;
     p.seconds =
         (p.state == TRC_PROGRESS_RUNNING ? trc_seconds() : render->time_end) - render->time_start;
     p.rays_camera = render->counts.rays_camera;

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "core/core.h"
+#include "model/extra.h"
 
 /* Batches double up to this size: a larger one would leave a preview unchanged for too long. */
 #define MAX_BATCH_LOG2 6
@@ -46,6 +47,8 @@ static void order_from_centre(struct trc_schedule *s) {
 uint32_t trc_schedule_batch_begin(const struct trc_schedule *schedule, uint32_t batch) {
     if (batch == 0)
         return 0;
+    if (schedule->extra_batches)
+        return schedule->sample_count << (batch - 1);
     if (!schedule->progressive || batch >= schedule->batch_count)
         return schedule->sample_count;
     if (batch <= MAX_BATCH_LOG2 + 1)
@@ -79,9 +82,10 @@ trc_status trc_schedule_create(const trc_render_desc *desc, struct trc_schedule 
         .tiles_y = trc_film_tiles(desc->crop_height),
         .sample_begin = desc->sample_offset,
         .sample_count = sample_count_of(desc),
-        .batch_count = count_batches(desc),
+        .extra_batches = desc->extra_samples > 0.0f ? TRC_EXTRA_LEVELS : 0,
         .progressive = desc->progressive != 0,
     };
+    made.batch_count = count_batches(desc) + made.extra_batches;
     made.tile_count = made.tiles_x * made.tiles_y;
     made.order = trc_alloc(made.tile_count, sizeof *made.order);
     if (!made.order)

@@ -19,7 +19,9 @@ struct trc_schedule {
     uint32_t *order; /* tile_count: tile numbers, rows from the bottom */
     uint32_t sample_begin, sample_count;
     uint32_t batch_count;
-    bool progressive; /* batches 1, 1, 2, 4, ... samples; else one batch of all */
+    uint32_t
+        extra_batches; /* of those, with extra samples: as many as there are, 2, 4, ... times */
+    bool progressive;  /* batches 1, 1, 2, 4, ... samples; else one batch of all */
 };
 
 struct trc_tile_area {
@@ -30,7 +32,7 @@ struct trc_tile_area {
 trc_status trc_schedule_create(const trc_render_desc *desc, struct trc_schedule *schedule);
 void trc_schedule_destroy(struct trc_schedule *schedule);
 
-/* First sample of a batch, counted from sample_begin; of batch_count: sample_count. */
+/* First sample of a batch, counted from sample_begin; of batch_count: the end of the last. */
 uint32_t trc_schedule_batch_begin(const struct trc_schedule *schedule, uint32_t batch);
 
 struct trc_tile_area trc_schedule_tile(const struct trc_schedule *schedule, uint32_t tile);

@@ -81,14 +81,16 @@ static void batch_render(struct trc_tile *t) {
 
 /* Whether a pixel of the tile gets samples. */
 TRC_INLINE bool is_sampled(const struct trc_tile_job *job, uint32_t x, uint32_t y) {
-    const struct trc_adaptive *a = job->adaptive;
-    return !a || a->pixels[(size_t)(job->y + y) * a->width + job->x + x].reasons;
+    const size_t pixel = (size_t)(job->y + y) * job->film->width + job->x + x;
+    if (job->extra)
+        return job->extra->levels[pixel] >= job->extra_level;
+    return !job->adaptive || job->adaptive->pixels[pixel].reasons;
 }
 
 /* How many pixels of the square at x, y get samples, at most. */
 static uint32_t square_pixels(const struct trc_tile *t, uint32_t x, uint32_t y) {
     const struct trc_tile_job *job = t->job;
-    if (!job->adaptive)
+    if (!job->adaptive && !job->extra)
         return SQUARE * SQUARE;
     uint32_t count = 0;
     for (uint32_t j = y; j < y + SQUARE && j < job->height; j++)
