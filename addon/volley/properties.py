@@ -97,6 +97,11 @@ class VolleySceneSettings(bpy.types.PropertyGroup):
         name="Light Samples", default=0, min=0, max=64,
         description="Shadow rays at each point the camera sees; 0 lets the library choose",
         update=_changed)
+    extra_samples: FloatProperty(
+        name="Extra Samples", default=0.25, min=0.0, max=1.0, subtype='FACTOR',
+        description="Share of all rays that the final render takes besides, where noise remains once every "
+                    "pixel has its samples: few pixels get 2, 4 or 8 times as many. Not with a noise threshold or "
+                    "a time limit, nor of parts", update=_changed)
     use_adaptive_sampling: BoolProperty(
         name="Use Adaptive Sampling", default=False,
         description="Stop sampling a pixel when its estimated noise is low enough", update=_changed)

@@ -87,6 +87,8 @@ class Session:
             sample_count = _fit_subset(settings)
             # All of the picture must have samples when the time is over.
             settings["progressive"] = int(time_limit > 0.0)
+            if job.job().parts_folder:  # which samples are extra ones takes all parts
+                settings["extra_samples"] = 0.0
             render = self._sync.scene.start_render(**settings)
             try:
                 progress = _Run(engine, self._sync, render, sample_count, time_limit, scene.frame_current).follow(
@@ -330,6 +332,7 @@ def render_fields(scene, frame, crop, entries, is_preview=False):
         "sample_offset": 0 if is_preview else settings.sample_offset,
         "sample_subset": 0 if is_preview else settings.sample_subset,
         "light_samples": settings.light_samples,
+        "extra_samples": 0.0 if is_preview else settings.extra_samples,
         "max_depth": settings.max_depth, "max_shadow_depth": settings.max_transparent_depth,
         "max_transparent_depth": max(settings.max_transparent_depth - int(COUNTS_LAST_PASSED), 0),
         "max_glossy_depth": settings.max_glossy_depth,

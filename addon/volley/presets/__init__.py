@@ -10,7 +10,7 @@ from bpy.types import Operator, Panel
 
 _SUBDIRECTORY = "volley/sampling"
 _OWN = os.path.join(os.path.dirname(__file__), "sampling")
-_SAVED = ("integrator", "samples", "preview_samples", "light_samples", "use_adaptive_sampling",
+_SAVED = ("integrator", "samples", "preview_samples", "light_samples", "extra_samples", "use_adaptive_sampling",
           "noise_threshold", "adaptive_min_samples", "use_preview_adaptive_sampling",
           "preview_noise_threshold", "preview_adaptive_min_samples", "time_limit", "use_denoising",
           "use_preview_denoising", "preview_denoising_start_sample",

@@ -64,6 +64,9 @@ class VOLLEY_RENDER_PT_sampling_render(VolleyPanel, Panel):
     def draw(self, context):
         settings, layout = context.scene.volley, column_of(self)
         _draw_samples(layout, settings)
+        extra = layout.column()
+        extra.active = not settings.use_adaptive_sampling and not settings.time_limit
+        extra.prop(settings, "extra_samples")
         layout.operator(denoise_nodes.VOLLEY_OT_set_up_denoise_nodes.bl_idname)
         layout.prop(settings, "time_limit")
         layout.prop(settings, "light_samples")

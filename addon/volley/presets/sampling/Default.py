@@ -5,5 +5,6 @@ volley.integrator = 'DISTRIBUTION'
 volley.samples = 64
 volley.preview_samples = 32
 volley.light_samples = 0
+volley.extra_samples = 0.25
 volley.use_adaptive_sampling = False
 volley.time_limit = 0.0
