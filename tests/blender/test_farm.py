@@ -92,7 +92,9 @@ def merged_bits(folder):
     for case, settings in cases.items():
         for name, value in settings.items():
             setattr(scene.volley, name, value)
+        scene.volley.extra_samples = 0.0
         whole = _whole(scene)
+        scene.volley.property_unset("extra_samples")  # parts have none
         for count in {"plain": (1, 2, 5, 64), "adaptive": (16,), "denoise": (2,)}[case]:
             parts = f"{folder}/{case}{count}"
             assert command.run(["render", "--parts", parts, "--blocks", f"0-{count - 1}/{count}"]) == 0

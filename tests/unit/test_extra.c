@@ -9,7 +9,8 @@
 
 /* ---- the plan, of films whose noise is known ---- */
 
-enum { SIDE = 24, PIXELS = SIDE * SIDE, SAMPLES = 16 };
+/* Four tiles. */
+enum { SIDE = 40, PIXELS = SIDE * SIDE, SAMPLES = 16 };
 
 struct square {
     struct trc_film film;
@@ -73,37 +74,53 @@ static uint64_t planned_of(const struct square *s) {
     return extra;
 }
 
-/* Against noise and costs by doubles, pixel by pixel. */
+/* Rays of a sample of each pixel, by its tile: some power of two. */
+static void set_rays(struct square *s, struct rng *r, double *rays) {
+    for (uint32_t y = 0; y < SIDE; y += TRC_TILE_SIZE)
+        for (uint32_t x = 0; x < SIDE; x += TRC_TILE_SIZE) {
+            const uint32_t each = 1u << rng_below(r, 6);
+            const uint32_t right = x ? SIDE : TRC_TILE_SIZE, up = y ? SIDE : TRC_TILE_SIZE;
+            *trc_extra_tile_rays(&s->extra, x, y) = (right - x) * (up - y) * SAMPLES * each;
+            for (uint32_t j = y; j < up; j++)
+                for (uint32_t i = x; i < right; i++)
+                    rays[j * SIDE + i] = each;
+        }
+}
+
+/* Against noise over the root of rays, and rays, by doubles, pixel by pixel. */
 static void plans(void **state) {
     (void)state;
     struct rng r = rng_seed(3);
     for (int trial = 0; trial < 40; trial++) {
         const double share = trial % 4 * 0.15 + 0.02;
         struct square *s = square_create((float)share);
-        double apart[PIXELS], noise[PIXELS];
+        double apart[PIXELS], worth[PIXELS], rays[PIXELS], all = 0.0, planned = 0.0;
+        set_rays(s, &r, rays);
         for (uint32_t i = 0; i < PIXELS; i++) {
             apart[i] = pow(2.0, -6.0 * (double)rng_unit(&r));
             set_noise(s, i, (float)apart[i]);
         }
         assert_true(trc_extra_plan(&s->extra, &s->film) == planned_of(s));
-        double least = INFINITY; /* noise of level 1 */
+        double least = INFINITY; /* of level 1 */
         for (uint32_t i = 0; i < PIXELS; i++) {
-            noise[i] = noise_around(apart, i);
-            if (s->extra.levels[i] && noise[i] < least)
-                least = noise[i];
+            worth[i] = noise_around(apart, i) / sqrt(rays[i]);
+            all += rays[i];
+            planned += rays[i] * (pow(2.0, s->extra.levels[i]) - 1.0);
+            if (s->extra.levels[i] && worth[i] < least)
+                least = worth[i];
         }
         /* As many as the share allows: a bin is a sixteenth of an octave, weights have 4 digits. */
         double lower = 0.0;
         for (uint32_t i = 0; i < PIXELS; i++) {
-            const double octave = log2(noise[i] / least);
+            const double octave = log2(worth[i] / least);
             const uint32_t level = s->extra.levels[i];
             assert_true(level == 0 || octave > (double)level - 1.0 - 0.1);
             assert_true(level == TRC_EXTRA_LEVELS || octave < (double)level + 0.1);
             for (int k = 0; k < TRC_EXTRA_LEVELS; k++)
-                lower += octave > k - 0.15 ? pow(2.0, k) : 0.0;
+                lower += octave > k - 0.15 ? rays[i] * pow(2.0, k) : 0.0;
         }
-        assert_true((double)planned_of(s) <= share * PIXELS * SAMPLES);
-        assert_true(lower > share * PIXELS);
+        assert_true(planned <= share * all * 1.000001);
+        assert_true(lower > share * all);
         square_destroy(s);
     }
 }
