@@ -11,7 +11,8 @@ tile by that, and the seconds of both renders. Errors do not depend on the load 
 --keep DIR the pictures without Denoise stay there and are not rendered again, and have no times then.
 
 --flicker renders so many successive frames instead, each with another seed: relative squared changes of the
-error from frame to frame, of pictures with Denoise, without, and without at 4 times the samples, over the last.
+error from frame to frame, of pictures with Denoise, without, and without at 4 times the samples and no extra ones,
+over the last.
 """
 
 import argparse
@@ -31,13 +32,15 @@ SEED, REFERENCE_SEED = 1, 1000
 # Tiles whose relative error is below are as good as without noise.
 LEAST_ERROR = 1e-5
 LEAST_MEASURE = 1e-30  # of a picture without noise
+EVEN = "plain, 4 times", "exact"  # pictures of measure_flicker() whose pixels all have as many samples
 
 
-def job(options, samples, denoise, seed, output, frame=None):
+def job(options, samples, denoise, seed, output, frame=None, **volley):
     """One picture for scene_setups.py's batch."""
     settings = {"width": options.width, "height": options.height, "samples": samples, "seed": seed,
-                "volley": {"use_denoising": denoise}}
-    return {"engine": "VOLLEY", "frame": options.frame if frame is None else frame, "settings": settings, "output": str(output)}
+                "volley": {"use_denoising": denoise, **volley}}
+    return {"engine": "VOLLEY", "frame": options.frame if frame is None else frame, "settings": settings,
+            "output": str(output)}
 
 
 def run_jobs(blend, jobs, options):
@@ -130,7 +133,8 @@ def measure_flicker(blend, options):
         with tempfile.TemporaryDirectory() as folder:
             paths = {kind: [pathlib.Path(folder) / f"{kind}-{frame}.exr" for frame in frames] for kind in kinds}
             run_jobs(blend, [job(options, *kinds[kind], (REFERENCE_SEED if kind == "exact" else SEED) + frame,
-                                 path, frame) for kind in kinds for frame, path in zip(frames, paths[kind])], options)
+                                 path, frame, **({"extra_samples": 0.0} if kind in EVEN else {}))
+                             for kind in kinds for frame, path in zip(frames, paths[kind])], options)
             pictures = {kind: [compare.read_rgb(path).astype(np.float64) for path in made]
                         for kind, made in paths.items()}
         exact = pictures.pop("exact")

@@ -100,7 +100,7 @@ def _flicker(scenes):
     return "\n\n".join([
         f"Flicker over {denoise.FLICKER_FRAMES} frames at {denoise.FLICKER_SAMPLES} samples, each frame with another seed: the "
         "relative square by which a pixel's error changes from one frame to the next, over that of plain pictures of 4 times "
-        "the samples:",
+        "the samples and no extra ones:",
         table(["scene", "with Denoise", "without"],
               [[words(name), digits(row["with"]), digits(row["without"])] for name, row in scenes.items()])])
 

@@ -41,5 +41,5 @@ def section(results):
         return ""
     return "\n\n".join([
         "## Whole files",
-        f"A first F12 in a new Blender at {SIZE_PX[0]}×{SIZE_PX[1]} and {whole_renders.SAMPLES} samples: evaluation, "
-        "sync, build and rays. Errors are against a Cycles picture of more samples, the same for both.", *tables])
+        f"A first F12 in a new Blender at {SIZE_PX[0]}×{SIZE_PX[1]} and {whole_renders.SAMPLES} samples, none extra: "
+        "evaluation, sync, build and rays. Errors are against a Cycles picture of more samples, the same for both.", *tables])

@@ -58,9 +58,9 @@ def section(results):
         return ""
     return "\n\n".join([
         "## Hair",
-        f"A first F12 in a new Blender at {SIZE_PX[0]}×{SIZE_PX[1]} and {whole_renders.SAMPLES} samples: Blender's "
-        "growing of the strands, sync, build and rays. Errors are against a Cycles picture of more samples, the same "
-        "for both.", *tables])
+        f"A first F12 in a new Blender at {SIZE_PX[0]}×{SIZE_PX[1]} and {whole_renders.SAMPLES} samples, none extra: "
+        "Blender's growing of the strands, sync, build and rays. Errors are against a Cycles picture of more samples, "
+        "the same for both.", *tables])
 
 
 def _tables(results):

@@ -83,9 +83,9 @@ def shrunk(picture):
 
 
 def settings_of(own, samples, seed):
-    """Both engines' settings of one picture."""
+    """Both engines' settings of one picture, of as many samples: Volley takes no extra ones."""
     return {**scene_setups.DEFAULT_SETTINGS, "width": own.width, "height": own.height, "samples": samples,
-            "seed": seed, "max_depth": MAX_DEPTH}
+            "seed": seed, "max_depth": MAX_DEPTH, "volley": {"extra_samples": 0.0}}
 
 
 def reference_stack(blend, scope, own):
