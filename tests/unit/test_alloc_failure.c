@@ -171,11 +171,13 @@ static void set_view(struct session *s) {
 
 static void check_render(struct session *s, uint32_t progressive) {
     enum { WIDTH = 33, HEIGHT = 1 }; /* two tiles; hundreds of sessions run */
-    trc_render_desc desc = default_render_desc(WIDTH, HEIGHT, progressive ? 8 : 2);
+    trc_render_desc desc = default_render_desc(WIDTH, HEIGHT, progressive ? 8 : 4);
     desc.progressive = progressive;
     if (progressive) {
         desc.noise_threshold = 0.1f;
         desc.min_samples = 4;
+    } else {
+        desc.extra_samples = 0.25f;
     }
     desc.passes = (1u << TRC_PASS_COUNT) - 1;
     desc.cryptomattes = (1u << TRC_CRYPTOMATTE_KINDS) - 1;

@@ -163,6 +163,9 @@ static void refuse_films(trc_scene scene) {
     desc.cryptomatte_depth = 6;
     expect_refused(scene, &desc);
     desc = frame_desc(4096, rows);
+    desc.extra_samples = 0.25f; /* 53 */
+    expect_refused(scene, &desc);
+    desc = frame_desc(4096, rows);
     desc.thread_count = 1024; /* their scratch memory */
     desc.integrator = TRC_INTEGRATOR_WHITTED;
     expect_refused(scene, &desc);

@@ -69,6 +69,9 @@ static void render_settings(void **state) {
     REFUSE_RENDER(ARGUMENT, desc.progressive = 2);
     REFUSE_RENDER(ARGUMENT, desc.noise_threshold = NAN);
     REFUSE_RENDER(LARGE, desc.min_samples = (1u << 20) + 1);
+    REFUSE_RENDER(ARGUMENT, desc.extra_samples = NAN);
+    REFUSE_RENDER(ARGUMENT, desc.extra_samples = -0.1f);
+    REFUSE_RENDER(ARGUMENT, desc.extra_samples = 1.5f);
 }
 
 static void render_reads(void **state) {

@@ -18,6 +18,8 @@
  * sequences among pixels. A pixel whose chain outlasts its count is sampled on for the chain alone:
  * those samples are left out of the picture.
  *
+ * Extra samples (model/extra.h) are the other way about: a share of rays is given, not an error.
+ *
  * Neighbours are looked for within the tile: no tile waits for another, and nothing depends on the
  * number of threads. A pixel without a direct neighbour gets all samples. */
 #ifndef TRACER_MODEL_ADAPTIVE_H

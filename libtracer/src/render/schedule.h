@@ -19,9 +19,9 @@ struct trc_schedule {
     uint32_t *order; /* tile_count: tile numbers, rows from the bottom */
     uint32_t sample_begin, sample_count;
     uint32_t batch_count;
-    uint32_t
-        extra_batches; /* of those, with extra samples: as many as there are, 2, 4, ... times */
-    bool progressive;  /* batches 1, 1, 2, 4, ... samples; else one batch of all */
+    /* Of those, with extra samples: each doubles what its pixels have. */
+    uint32_t extra_batches;
+    bool progressive; /* batches 1, 1, 2, 4, ... samples; else one batch of all */
 };
 
 struct trc_tile_area {
