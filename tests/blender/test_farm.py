@@ -437,6 +437,31 @@ def test_files_that_a_frame_reads_are_known(tmp_path):
     assert changed == {"image plain.tga", "image t.1001.tga 1001", "image t.1001.tga 1012", "image s_005.tga 8"}
 
 
+def inside_names(folder):
+    """How many parts there are of two halves of two layers, and the layers of the merged frame: names differ in letters
+    that files do not get, and are as long as Blender lets them be."""
+    import bpy
+    from volley.farm import command, exr
+    _make_scene(f"{folder}/farm.blend")
+    scene, parts = bpy.context.scene, f"{folder}/parts"
+    scene.volley.samples, scene.name = 2, "s" * 200
+    scene.view_layers[0].name = "\u80cc\u666f"
+    scene.view_layers.new("\u4eba\u7269")
+    scene.view_layers.new("n" * 200)
+    bpy.ops.wm.save_mainfile()
+    assert command.run(["render", "--parts", parts, "--blocks", "0-1/2"]) == 0
+    assert command.run(["merge", parts, "--output", f"{folder}/merged_#"]) == 0
+    _, channels, _ = exr.read(f"{folder}/merged_1.exr")
+    return len(os.listdir(parts)), {name.split(".")[0] for name in channels}, {each.name for each in scene.view_layers}
+
+
+def test_layers_have_files_whatever_their_names(tmp_path):
+    """Two layers of Chinese names had one file, so that the merged frame lacked one of them; names of 200 letters had
+    none."""
+    count, merged, layers = Blender().run(inside_names, str(tmp_path))
+    assert count == 6 and merged == layers and len(layers) == 3
+
+
 # The command line --------------------------------------------------------------------------------
 
 def _command(*arguments, blend=None, is_blenders=False, **options):

@@ -11,6 +11,7 @@ import hashlib
 import json
 import os
 import re
+import zlib
 
 import bpy
 import numpy as np
@@ -22,6 +23,7 @@ from . import exr, files, job
 ATTRIBUTE = "volley:part"
 EXTENSION = ".part.exr"
 _DIGEST = "volley:digest"
+_MAX_CHARACTERS = 48  # of each name in a file's; systems allow 255 bytes in all
 # Fields of trc_render_desc in which parts of a picture may differ.
 _OWN_FIELDS = {"sample_offset", "sample_subset", "thread_count", "progressive"}
 
@@ -56,8 +58,14 @@ def digests(scene):
 
 def path_of(folder, scene, layer_name, view_name, begin, end):
     """Where a part belongs."""
-    names = [re.sub(r"[^A-Za-z0-9_-]", "_", name) for name in (scene.name, layer_name, view_name) if name]
+    names = [_file_name(name) for name in (scene.name, layer_name, view_name) if name]
     return os.path.join(folder, f"{scene.frame_current:06d}.{'.'.join(names)}.{begin:07d}-{end:07d}{EXTENSION}")
+
+
+def _file_name(name):
+    """A name of Blender's for a part of a file's: other names have others, and none is too long."""
+    plain = re.sub(r"[^A-Za-z0-9_-]", "_", name)[:_MAX_CHARACTERS]
+    return plain if plain == name else f"{plain}-{zlib.crc32(name.encode()):08x}"
 
 
 def write(folder, scene, render, entries, fields, layer_name, view_name, content, manifests):
