@@ -462,6 +462,30 @@ def test_layers_have_files_whatever_their_names(tmp_path):
     assert count == 6 and merged == layers and len(layers) == 3
 
 
+def inside_more_files(folder):
+    """Which files are said to be missing of two IES files of one name, and of a mesh's cache that is shown and of one
+    that is not."""
+    import bpy
+    from volley.farm import command
+    _make_scene(f"{folder}/farm.blend")
+    for place in ("one", "two"):
+        light = bpy.data.lights.new(place, 'POINT')
+        light.use_nodes = True
+        node = light.node_tree.nodes.new("ShaderNodeTexIES")
+        node.mode, node.filepath = 'EXTERNAL', f"//{place}/lamp.ies"
+    for name in ("shown", "off"):
+        modifier = bpy.data.objects["Cube"].modifiers.new(name, 'MESH_CACHE')
+        modifier.filepath, modifier.show_render = f"//{name}.mdd", name == "shown"
+    return [message.replace(folder, "") for message in command.missing_files([1])]
+
+
+def test_files_of_one_name_and_caches_are_known(tmp_path):
+    """The first of the IES files, and the cache, were not looked for."""
+    assert sorted(Blender().run(inside_more_files, str(tmp_path))) == [
+        f"{kind} {path}: there is no such file"
+        for kind, path in (("cache", "/shown.mdd"), ("light", "/one/lamp.ies"), ("light", "/two/lamp.ies"))]
+
+
 # The command line --------------------------------------------------------------------------------
 
 def _command(*arguments, blend=None, is_blenders=False, **options):

@@ -6,6 +6,7 @@ Not among them: caches of physics beside the .blend, and what add-ons and script
 """
 
 import hashlib
+import itertools
 import os
 
 import bpy
@@ -23,6 +24,9 @@ def paths(frame):
              for library in bpy.data.libraries if not library.packed_file}
     found.update((f"cache {cache.name_full}", _absolute(cache.filepath, cache))
                  for cache in bpy.data.cache_files if cache.users)
+    found.update((f"cache {owner.name_full} {modifier.name}", _absolute(modifier.filepath, owner))
+                 for owner in bpy.data.objects if owner.users for modifier in owner.modifiers
+                 if modifier.type == 'MESH_CACHE' and modifier.show_render and modifier.filepath)
     found.update((f"font {font.name_full}", _absolute(font.filepath, font)) for font in bpy.data.fonts
                  if font.users and not font.packed_file and font.filepath != _BUILT_IN)
     for image in bpy.data.images:
@@ -35,7 +39,8 @@ def paths(frame):
     for tree in _trees():
         for node in tree.nodes:
             if node.type == 'TEX_IES' and node.mode == 'EXTERNAL' and node.filepath:
-                found[f"light {os.path.basename(node.filepath)}"] = _absolute(node.filepath, tree)
+                path = _absolute(node.filepath, tree)
+                found[_free_name(f"light {os.path.basename(path)}", path, found)] = path
     return found
 
 
@@ -43,6 +48,12 @@ def digests(frame):
     """{name: digest} of the .blend and of :func:`paths`; "missing" where there is no file."""
     return {"scene": _digest_of(bpy.data.filepath),
             **{name: _digest_of(path) for name, path in paths(frame).items()}}
+
+
+def _free_name(name, path, found):
+    """The name, with a number where it stands for another path already."""
+    names = itertools.chain([name], (f"{name} {number}" for number in itertools.count(2)))
+    return next(each for each in names if found.get(each, path) == path)
 
 
 def _absolute(path, owner):
