@@ -488,6 +488,30 @@ def test_files_of_one_name_and_caches_are_known(tmp_path):
 
 # The command line --------------------------------------------------------------------------------
 
+def inside_views(folder):
+    """{format of views: (exit code, files)} of a stereo frame by the command line."""
+    import bpy
+    from volley.farm import command
+    _make_scene(f"{folder}/farm.blend")
+    render, found = bpy.context.scene.render, {}
+    render.use_multiview, bpy.context.scene.volley.samples = True, 1
+    for views in ('INDIVIDUAL', 'STEREO_3D'):
+        render.image_settings.views_format = views
+        summary = f"{folder}/{views}.json"
+        code = command.run(["render", "--output", f"{folder}/{views}_#", "--summary", summary])
+        with open(summary, encoding="utf-8") as file:
+            outputs = json.load(file)["outputs"]
+        found[views] = code, [os.path.basename(path) for path in outputs if os.path.isfile(path)]
+    return found
+
+
+def test_views_may_have_files_of_their_own(tmp_path):
+    """Such frames failed, as the file that they have otherwise was not there."""
+    assert Blender().run(inside_views, str(tmp_path)) == {
+        'INDIVIDUAL': (0, ["INDIVIDUAL_1_L.png", "INDIVIDUAL_1_R.png"]), 'STEREO_3D': (0, ["STEREO_3D_1.png"])}
+
+
+
 def _command(*arguments, blend=None, is_blenders=False, **options):
     """A Blender that runs the command line; is_blenders: as a command of its own, where it has such."""
     environment = {**os.environ, "BLENDER_USER_SCRIPTS": user_scripts()}

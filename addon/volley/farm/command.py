@@ -213,16 +213,26 @@ def _render_frame(options, scene, frame, blocks):
 def _render_whole(options, scene):
     if options.output:
         scene.render.filepath = options.output
-    path = bpy.path.abspath(scene.render.frame_path(frame=scene.frame_current))
-    before = _stamp(path)
+    path, *of_views = _picture_paths(scene)
+    before = {each: _stamp(each) for each in (path, *of_views)}
     kept, scene.render.filepath = scene.render.filepath, path
     try:
         bpy.ops.render.render(write_still=True)
     finally:
         scene.render.filepath = kept
-    if _stamp(path) in (None, before) and not job.job().failures:
+    for paths in filter(None, ([path], of_views)):
+        if all(_stamp(each) not in (None, before[each]) for each in paths):
+            return paths
+    if not job.job().failures:
         raise OSError(f"{path} was not written")
     return [path]
+
+
+def _picture_paths(scene):
+    """The path of a frame's picture, and those of its views, which may have files of their own instead."""
+    render = scene.render
+    views = [view.name for view in render.views if view.use] if render.use_multiview else []
+    return [bpy.path.abspath(render.frame_path(frame=scene.frame_current, view=name)) for name in ("", *views)]
 
 
 def _stamp(path):
