@@ -488,6 +488,30 @@ def test_files_of_one_name_and_caches_are_known(tmp_path):
 
 # The command line --------------------------------------------------------------------------------
 
+def inside_numbers(folder):
+    """What numbers of frames stand for or what is said of them, and exit codes of command lines with bad ones."""
+    from volley.farm import command
+    found = {}
+    for text in ("1,5-8", "1-20:6", "-8--6", "-2-3:2", "8-5", "3-", "", "1:0", "x"):
+        try:
+            found[text] = command.numbers_of(text)
+        except ValueError as error:
+            found[text] = str(error)
+    lines = ("render --frames 8-5", "render --parts x --blocks 0/0", "render --parts x --blocks=-1/4",
+             "render --parts x --samples 5", "merge x --output y --frames z")
+    return found, [command.run(line.replace("x", folder, 1).split()) for line in lines]
+
+
+def test_numbers_of_frames(tmp_path):
+    """Ranges that begin below 0 were none, and empty ones, blocks of none and half a range of samples ended in an
+    error of Python's."""
+    found, codes = Blender().run(inside_numbers, str(tmp_path))
+    assert found == {"1,5-8": [1, 5, 6, 7, 8], "1-20:6": [1, 7, 13, 19], "-8--6": [-8, -7, -6], "-2-3:2": [-2, 0, 2],
+                     "8-5": "'8-5' has no frames", **{text: f"'{text}' tells no frames"
+                                                      for text in ("3-", "", "1:0", "x")}}
+    assert codes == [2] * len(codes)
+
+
 def inside_views(folder):
     """{format of views: (exit code, files)} of a stereo frame by the command line."""
     import bpy

@@ -11,6 +11,7 @@ Exit codes: 0 all is there; 1 something failed; 2 the command line, or with --st
 
 import argparse
 import os
+import re
 import shutil
 import signal
 import sys
@@ -84,26 +85,39 @@ def _parser():
     return parser
 
 
+_FRAMES = re.compile(r"(-?\d+)(?:-(-?\d+))?(?::(0*[1-9]\d*))?")  # first, last, step
+_SAMPLES = re.compile(r"(\d+):(\d+)")
+_BLOCKS = re.compile(r"(\d+)(?:-(\d+))?/(0*[1-9]\d*)")
+
+
 def numbers_of(text):
-    """The frames that 1,5-8 or 1-100:10 stand for."""
+    """The frames that 1,5-8 or 1-100:10 stand for; some may be negative, as -8--5."""
     found = []
     for piece in text.split(","):
-        span, _, step = piece.partition(":")
-        first, dash, last = span.partition("-") if not span.startswith("-") else (span, "", "")
-        found += range(int(first), int(last if dash else first) + 1, int(step or 1))
+        first, last, step = _numbers(_FRAMES, piece, "frames")
+        numbers = range(first, (first if last is None else last) + 1, step or 1)
+        if not numbers:
+            raise ValueError(f"'{piece}' has no frames")
+        found += numbers
     return found
+
+
+def _numbers(form, text, what):
+    """The groups of a text as whole numbers, None where it has none; ValueError where it is of another form."""
+    match = form.fullmatch(text.strip())
+    if match is None:
+        raise ValueError(f"'{text}' tells no {what}")
+    return [None if group is None else int(group) for group in match.groups()]
 
 
 def blocks_of(options, sample_count):
     """(begin, end) of each part to render."""
     if options.samples:
-        begin, end = (int(number) for number in options.samples.split(":"))
-        blocks = [(begin, end)]
+        blocks = [tuple(_numbers(_SAMPLES, options.samples, "samples"))]
     elif options.blocks:
-        span, count = options.blocks.split("/")
-        first, dash, last = span.partition("-")
-        ends = [index * sample_count // int(count) for index in range(int(count) + 1)]
-        blocks = list(zip(ends, ends[1:]))[int(first):int(last if dash else first) + 1]
+        first, last, count = _numbers(_BLOCKS, options.blocks, "blocks")
+        ends = [index * sample_count // count for index in range(count + 1)]
+        blocks = list(zip(ends, ends[1:]))[first:(first if last is None else last) + 1]
     else:
         blocks = [(0, sample_count)]
     if not blocks or any(not 0 <= begin < end <= sample_count for begin, end in blocks):
@@ -286,7 +300,11 @@ def _parts_there(folder, scene, begin, end):
 
 def _merge(options):
     found = merge.frames_in(options.folder)
-    frames = numbers_of(options.frames) if options.frames else sorted(found)
+    try:
+        frames = numbers_of(options.frames) if options.frames else sorted(found)
+    except ValueError as error:
+        job.say(f"error: {error}")
+        return EXIT_REFUSED
     if not frames:
         job.say(f"error: {options.folder}: there are no parts")
         return EXIT_FAILED
