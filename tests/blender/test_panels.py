@@ -94,7 +94,7 @@ def inside_panels():
     import types
     import drawing
     import scenes
-    from volley.ui import render, shading, view
+    from volley.ui import render, shading, view, view_layer
     scene = scenes.empty()
     light = scenes.light('POINT').data
     light.use_nodes = False
@@ -103,7 +103,8 @@ def inside_panels():
     bpy.context.view_layer.use_pass_mist = True
     found["mist"] = shading.VOLLEY_WORLD_PT_mist.poll(context)
     for panel in (shading.VOLLEY_WORLD_PT_mist, shading.VOLLEY_LIGHT_PT_nodes,
-                  render.VOLLEY_RENDER_PT_simplify_viewport, render.VOLLEY_RENDER_PT_simplify_render):
+                  render.VOLLEY_RENDER_PT_simplify_viewport, render.VOLLEY_RENDER_PT_simplify_render,
+                  view_layer.VOLLEY_VIEWLAYER_PT_override):
         found[panel.__name__] = drawing.draw(panel, context).properties
     for kind in ('MATERIAL', 'RENDERED'):
         shown = types.SimpleNamespace(type=kind, use_scene_world_render=True, use_scene_world=True)
@@ -119,6 +120,8 @@ def test_panels_show_what_they_are_for(blender):
     assert list(found["VOLLEY_WORLD_PT_mist"]) == ["start", "depth", "falloff"]
     if blender_support.version() < (5, 0):  # since then lights have nodes whatever they are told
         assert not found["VOLLEY_LIGHT_PT_nodes"]["use_nodes"]["is_split"]
+    own_world = {"world_override"} if blender_support.version() >= (4, 3) else set()
+    assert set(found["VOLLEY_VIEWLAYER_PT_override"]) == {"material_override", "samples"} | own_world
     assert "simplify_subdivision" in found["VOLLEY_RENDER_PT_simplify_viewport"]
     assert "simplify_subdivision_render" in found["VOLLEY_RENDER_PT_simplify_render"]
     assert {"use_scene_lights_render", "use_scene_world_render"} <= set(found['RENDERED']) and 'MATERIAL' not in found

@@ -36,6 +36,7 @@ class VOLLEY_VIEWLAYER_PT_override(_ViewLayerPanel, Panel):
     def draw(self, context):
         layout = column_of(self)
         layout.prop(context.view_layer, "material_override")
+        prop_if_present(layout, context.view_layer, "world_override")  # from 4.3 on
         layout.prop(context.view_layer, "samples")
 
 
