@@ -142,6 +142,8 @@ def inside_dots():
 
     for kind in ('POINT', 'SPOT', 'SUN', 'AREA'):
         note(kind, shading.VOLLEY_LIGHT_PT_light, light=scenes.light(kind).data)
+    settings = bpy.data.lights[0].cycles
+    found["shadow switch"] = {"cast_shadow" if hasattr(settings, "cast_shadow") else "use_shadow"}
     note("rays of a light", objects.VOLLEY_OBJECT_PT_ray_visibility, object=bpy.data.objects[0])
     note("rays of a mesh", objects.VOLLEY_OBJECT_PT_ray_visibility, object=scenes.wall())
     note("visibility", objects.VOLLEY_OBJECT_PT_visibility, object=bpy.data.objects["Wall"])
@@ -152,6 +154,7 @@ def test_what_is_animated_has_dots(blender):
     found = blender.run(inside_dots)
     for kind in ('POINT', 'SPOT', 'SUN', 'AREA'):
         assert {"color", "energy"} <= found[kind], kind
+        assert {"cast_shadow", "use_shadow"} & found[kind] == found["shadow switch"], kind  # that which counts
     rays = {f"visible_{name}" for name in ("camera", "diffuse", "glossy", "transmission")}
     assert rays == found["rays of a light"] and found["rays of a mesh"] == rays | {"visible_shadow"}
     assert {"hide_viewport", "hide_render"} <= found["visibility"]

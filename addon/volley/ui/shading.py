@@ -65,10 +65,10 @@ class _Light(_LightPanel):
         self._draw_shape(column, light)
         column.separator()
         settings = getattr(light, "cycles", None)
-        if hasattr(light, "use_shadow"):
-            column.prop(light, "use_shadow", text="Cast Shadow")
-        else:
-            prop_if_present(column, settings, "cast_shadow")
+        # Till 4.1 there are both, and Blender's own is EEVEE's.
+        has_own = not hasattr(settings, "cast_shadow")
+        prop_if_present(column, light if has_own else settings, "use_shadow" if has_own else "cast_shadow",
+                        text="Cast Shadow")
         prop_if_present(column, settings, "use_multiple_importance_sampling",
                          text="Multiple Importance")
         prop_if_present(column, settings, "max_bounces")
