@@ -10,12 +10,12 @@ _CORNER = (0.0, 0.0, 0.0)
 
 def frame_of(image_user, scene_frame):
     """The number of the frame that a node's settings name at a frame of the scene, as Cycles counts: whether they
-    refresh is of viewports alone."""
+    refresh is of viewports alone. None is below 0."""
     count = image_user.frame_duration
     place = scene_frame - image_user.frame_start + 1
     if image_user.use_cyclic and count:
         place = (place - 1) % count + 1
-    return min(max(place, 0), count) + image_user.frame_offset
+    return max(min(max(place, 0), count) + image_user.frame_offset, 0)
 
 
 def turn_to(image, frame):
