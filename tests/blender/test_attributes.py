@@ -92,6 +92,15 @@ def inside_types():
     return _pictures_of(owners)
 
 
+def _store_random(store, kind, domain):
+    """Let a Store Named Attribute node give what is of a domain random values of a type, as "at"."""
+    store.data_type, store.domain, store.inputs["Name"].default_value = kind, domain, "at"
+    random = store.id_data.nodes.new("FunctionNodeRandomValue")
+    random.data_type = {'FLOAT_COLOR': 'FLOAT_VECTOR'}.get(kind, kind)
+    value = next(socket for socket in random.outputs if socket.enabled)
+    store.id_data.links.new(value, next(each for each in store.inputs if each.name == "Value" and each.enabled))
+
+
 def inside_points():
     """Pictures of numbers and switches of a cloud's points."""
     import scenes
@@ -102,12 +111,7 @@ def inside_points():
         points, store, assign = scenes.geometry_nodes(made, "GeometryNodeMeshToPoints",
                                                       "GeometryNodeStoreNamedAttribute", "GeometryNodeSetMaterial")
         points.inputs["Radius"].default_value = 0.12
-        store.data_type, store.domain, store.inputs["Name"].default_value = kind, 'POINT', "at"
-        group = store.id_data
-        random = group.nodes.new("FunctionNodeRandomValue")
-        random.data_type = kind
-        value = next(socket for socket in random.outputs if socket.enabled)
-        group.links.new(value, next(each for each in store.inputs if each.name == "Value" and each.enabled))
+        _store_random(store, kind, 'POINT')
         assign.inputs["Material"].default_value = _shining("Color", attribute_name="at")
     return _pictures_of(owners)
 
@@ -162,11 +166,7 @@ def inside_instances():
             shown = node.outputs["Instances"]
         group.links.new(next(n for n in group.nodes if n.type == 'GROUP_INPUT').outputs[0], outer.inputs["Points"])
         group.links.new(shown, outer.inputs["Instance"])
-        store.data_type, store.domain, store.inputs["Name"].default_value = kind, 'INSTANCE', "at"
-        random = group.nodes.new("FunctionNodeRandomValue")
-        random.data_type = {'FLOAT_COLOR': 'FLOAT_VECTOR'}.get(kind, kind)
-        value = next(socket for socket in random.outputs if socket.enabled)
-        group.links.new(value, next(each for each in store.inputs if each.name == "Value" and each.enabled))
+        _store_random(store, kind, 'INSTANCE')
     return _pictures_of(owners), told, hasattr(bpy.types.Object, "evaluated_geometry")
 
 
@@ -256,6 +256,60 @@ def inside_names(names):
     return _pictures_of(owners), told
 
 
+def _scatter(name, size, shown=None):
+    """An object that sets cubes, or instances of an object, on the corners of a grid, each with a colour unless it is
+    an object's."""
+    import scenes
+    made = _grid(name)
+    kinds = ("GeometryNodeInstanceOnPoints",) + ("GeometryNodeStoreNamedAttribute",) * (shown is None)
+    outer, *stores = scenes.geometry_nodes(made, *kinds)
+    group = outer.id_data
+    if shown is not None:
+        info = group.nodes.new("GeometryNodeObjectInfo")
+        info.inputs["Object"].default_value, info.inputs["As Instance"].default_value = shown, True
+        group.links.new(info.outputs["Geometry"], outer.inputs["Instance"])
+        return made
+    cube, assign = group.nodes.new("GeometryNodeMeshCube"), group.nodes.new("GeometryNodeSetMaterial")
+    cube.inputs["Size"].default_value = (size,) * 3
+    assign.inputs["Material"].default_value = _shining("Color", attribute_name="at", attribute_type='INSTANCER')
+    group.links.new(cube.outputs["Mesh"], assign.inputs["Geometry"])
+    group.links.new(assign.outputs["Geometry"], outer.inputs["Instance"])
+    _store_random(stores[0], 'FLOAT_COLOR', 'INSTANCE')
+    return made
+
+
+def _collected(name, *members):
+    """An empty that shows a collection of members, which the scene lets go of."""
+    import bpy
+    import scenes
+    collection = bpy.data.collections.new(name)
+    for each in members:
+        collection.objects.link(each)
+        bpy.context.scene.collection.objects.unlink(each)
+    made = scenes.link(name, None)
+    made.instance_type, made.instance_collection = 'COLLECTION', collection
+    return made
+
+
+def inside_collected():
+    """As inside_instances, of objects that nodes make instances on, which are instanced themselves: in a collection,
+    after another object, in a collection in one, and by other nodes."""
+    import bpy
+    import mathutils
+    import scenes
+    import volley.session
+    scenes.empty()
+    told = []
+    volley.session.report_warning = lambda _engine, message: told.append(message)
+    owners = {"collection": _collected("One", scenes.link("First", None), _scatter("Second", 0.2)),
+              "nested": _collected("Outer", _collected("Inner", _scatter("Third", 0.2)))}
+    small = _scatter("Fourth", 0.05)
+    small.data.transform(mathutils.Matrix.Scale(0.25, 4))
+    _collected("Hidden", small).hide_render = True
+    owners["object"] = _scatter("Fifth", 0.0, small)
+    return _pictures_of(owners), told, hasattr(bpy.types.Object, "evaluated_geometry")
+
+
 # Comparison ----------------------------------------------------------------------------------------
 
 def _compare(pictures, shows_nothing=()):
@@ -309,6 +363,16 @@ def test_instances_of_nodes(blender):
         _compare({case: [np.pad(each[RIM:-RIM, RIM:-RIM], ((RIM, RIM), (RIM, RIM), (0, 0))) for each in pair]
                   for case, pair in pictures.items()})
     assert any("attributes that nodes give instances" in line for line in told) != can_read, told
+
+
+def test_instances_of_nodes_that_are_instanced(blender):
+    """They were black, without a warning where they cannot be read."""
+    pictures, told, can_read = blender.run(inside_collected)
+    if can_read:
+        _compare({case: [np.pad(each[RIM:-RIM, RIM:-RIM], ((RIM, RIM), (RIM, RIM), (0, 0))) for each in pair]
+                  for case, pair in pictures.items()})
+    lines = [line for line in told if "attributes that nodes give instances" in line]
+    assert {line.split("'")[1] for line in lines} == (set() if can_read else {"One", "Outer", "Fifth"}), told
 
 
 def test_names_that_cycles_keeps(blender):

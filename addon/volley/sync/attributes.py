@@ -10,7 +10,7 @@ import bpy
 
 from ..abi import MAX_INSTANCE_VALUES, NodeType
 from .instance import VALUES_END
-from .instance_levels import HAS_GEOMETRIES, InstanceLevels
+from .instance_levels import HAS_GEOMETRIES, InstanceLevels, are_by_nodes
 from .values import CONSTANT, Value
 
 _COMPONENTS = 4  # RGBA
@@ -75,12 +75,11 @@ class Attributes:
         """Looked up in the settings of particles, in what nodes gave the instance, in its maker and the object."""
         system, maker = instance.particle_system, instance.parent
         value = None if system is None else _first_found((system.settings,), name)
-        is_of_nodes = system is None and any(each.type == 'NODES' for each in maker.modifiers)
-        if value is None and is_of_nodes and HAS_GEOMETRIES:
+        if system is None and HAS_GEOMETRIES:
             value = self._levels.find(instance, name)
         if value is None:
             value = _first_found((maker,), name) or _of_object(instance, name)
-        if value is None and is_of_nodes and not HAS_GEOMETRIES:
+        if value is None and system is None and not HAS_GEOMETRIES and are_by_nodes(instance):
             self._warnings.add(f"Object '{maker.name}': attributes that nodes give instances, such as '{name}', "
                                "cannot be read in this Blender")
         return value
