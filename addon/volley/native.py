@@ -16,6 +16,7 @@ import functools
 import importlib.util
 import os
 import sys
+import zlib
 
 import numpy as np
 
@@ -212,6 +213,8 @@ def _array(values, dtype):
     return None if values is None else np.ascontiguousarray(values, dtype=dtype)
 
 
+_MAX_NAME_BYTES = 63  # of an attribute; Blender 5 has longer ones
+
 # Of abi.DicingDesc: fields that are arrays, of their numbers of elements, and types.
 _DICING_ARRAYS = (("faces", "face_count", np.uint32), ("crease_edges", "crease_edge_count", np.uint32),
                   ("crease_sharpness", "crease_count", np.float32),
@@ -230,6 +233,15 @@ def view(address, shape, dtype):
 
 def _text(value):
     return value.encode("utf-8") if value else None
+
+
+def _attribute_name(name):
+    """The name of an attribute as the library takes it: of a longer one the beginning, and a digest."""
+    text = name.encode("utf-8")
+    if len(text) <= _MAX_NAME_BYTES:
+        return text
+    digest = b" %08x" % zlib.crc32(text)
+    return text[:_MAX_NAME_BYTES - len(digest)] + digest
 
 
 def find_tangents(positions, normals, uvs, form, has_seams=True):
@@ -315,7 +327,7 @@ class Scene:
         positions, indices = _array(positions, np.float32), _array(indices, np.uint32)
         normals, smooth = _array(normals, np.float32), _array(smooth, np.uint8)
         material_index, generated = _array(material_index, np.uint16), _array(generated, np.float32)
-        arrays = [(_text(name) or b"", _array(values, np.float32)) for name, values in attributes]
+        arrays = [(_attribute_name(name), _array(values, np.float32)) for name, values in attributes]
         structs = (abi.CornerAttribute * len(arrays))(*(
             describe(abi.CornerAttribute, width=values.shape[-1], name=name, values=_address(values),
                      value_count=values.size) for name, values in arrays))
@@ -350,7 +362,7 @@ class Scene:
         pieces everywhere. They are a mesh to all else."""
         points, lengths = _array(points, np.float32), _array(lengths, np.uint32)
         generated = _array(generated, np.float32)
-        arrays = [(_text(name) or b"", _array(values, np.float32), of_strands)
+        arrays = [(_attribute_name(name), _array(values, np.float32), of_strands)
                   for name, values, of_strands in attributes]
         structs = (abi.CurveAttribute * len(arrays))(*(
             describe(abi.CurveAttribute, width=values.shape[-1], name=name, values=_address(values),
@@ -460,7 +472,7 @@ class Scene:
             keep.append(table)
             structs.append(abi.Node(
                 type=node.type, mode=node.mode, first_input=len(inputs), input_count=len(node.inputs),
-                image=node.image, name=_text(node.name), table=_address(table),
+                image=node.image, name=_attribute_name(node.name), table=_address(table),
                 table_count=0 if table is None else table.size))
             inputs += [abi.NodeInput(node=source, output=output, value=tuple(value))
                        for source, output, value in node.inputs]

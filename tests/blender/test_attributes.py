@@ -11,6 +11,7 @@ COLUMNS = 6
 TOLERANCE = 5e-3   # 0.01 of a pixel of the steepest
 RIM = 5  # pixels
 ROOM = 64  # attributes of a mesh
+LONGEST = 255 if blender_support.version() >= (5, 0) else 62  # letters of a name
 SHARE_WITHIN = 0.98  # of a case's pixels; its outline may fall on either side
 
 NAMES = (("N", "Vector"), ("uv", "Vector"), ("uv", "Fac"), ("generated", "Vector"), ("tangent", "Vector"),
@@ -113,6 +114,21 @@ def inside_points():
         points.inputs["Radius"].default_value = 0.12
         _store_random(store, kind, 'POINT')
         assign.inputs["Material"].default_value = _shining("Color", attribute_name="at")
+    return _pictures_of(owners)
+
+
+def inside_long_names():
+    """Pictures of two attributes of a mesh whose names are as long as this Blender lets them be and differ at the
+    end."""
+    import scenes
+    scenes.empty()
+    random, owners = np.random.default_rng(7), {}
+    for letter in "ab":
+        made = _grid(letter)
+        for name in ("a", "b"):
+            _fill(made.data.attributes.new("n" * (LONGEST - 1) + name, 'FLOAT_COLOR', 'POINT'), random)
+        made.data.materials.append(_shining("Color", attribute_name="n" * (LONGEST - 1) + letter))
+        owners[letter] = made
     return _pictures_of(owners)
 
 
@@ -329,6 +345,17 @@ def test_types(blender):
     pictures = blender.run(inside_types)
     assert len(pictures) >= 32
     _compare(pictures, [case for case in pictures if IS_OLD and case.startswith("INT8")])
+
+
+def test_maps(blender):
+    """Attributes that are no UV maps were black in UV Map nodes."""
+    pictures = blender.run(inside_maps)
+    _compare(pictures, [case for case in pictures if IS_OLD and case.startswith("INT8")])
+
+
+def test_long_names(blender):
+    """In Blender 5 such meshes were left out, as the library takes names of 63 letters."""
+    _compare(blender.run(inside_long_names))
 
 
 def test_points(blender):
