@@ -46,15 +46,16 @@ def _fill(attribute, random):
         setattr(item, field, plain if width == 1 else value)
 
 
-def _shining(output, **settings):
-    """A material that shines with what an Attribute node gives, 0.1 added."""
+def _shining(output, kind="ShaderNodeAttribute", scale=(1.0, 1.0, 1.0), **settings):
+    """A material that shines with what an Attribute node, or one of another kind, gives, scaled and 0.1 added."""
     import scenes
     made = scenes.emitter((0.0, 0.0, 0.0), output)
     tree = made.node_tree
-    node, shown = tree.nodes.new("ShaderNodeAttribute"), tree.nodes.new("ShaderNodeVectorMath")
+    node, shown = tree.nodes.new(kind), tree.nodes.new("ShaderNodeVectorMath")
     for name, value in settings.items():
         setattr(node, name, value)
-    shown.operation, shown.inputs[1].default_value = 'ADD', (0.1, 0.1, 0.1)
+    shown.operation, shown.inputs[1].default_value = 'MULTIPLY_ADD', scale
+    shown.inputs[2].default_value = (0.1, 0.1, 0.1)
     tree.links.new(node.outputs[output], shown.inputs[0])
     tree.links.new(shown.outputs[0], scenes.shader_of(made).inputs["Color"])
     return made
@@ -77,11 +78,20 @@ def _pictures_of(owners):
 
 def inside_types():
     """Pictures of every type on every domain."""
+    return _types_in(lambda: _shining("Color", attribute_name="at"))
+
+
+def inside_maps():
+    """The same by the first two coordinates of a UV Map node."""
+    return _types_in(lambda: _shining("UV", "ShaderNodeUVMap", (1.0, 1.0, 0.0), uv_map="at"))
+
+
+def _types_in(make_material):
+    """Pictures of attributes of every type on every domain, each in a material."""
     import bpy
     import scenes
     scenes.empty()
-    random, owners = np.random.default_rng(7), {}
-    material = _shining("Color", attribute_name="at")
+    random, owners, material = np.random.default_rng(7), {}, make_material()
     known = {item.identifier for item in bpy.types.Attribute.bl_rna.properties["data_type"].enum_items}
     for kind in ('FLOAT', 'INT', 'INT8', 'BOOLEAN', 'FLOAT_VECTOR', 'FLOAT2', 'FLOAT_COLOR', 'BYTE_COLOR',
                  'QUATERNION'):

@@ -100,7 +100,9 @@ def extract(mesh, uv_names=(), color_names=(), material_count=1, group_names=())
     if material_count > 1:
         data.material_index = _material_index(mesh, loops)
     read_normals(mesh, data, loops)
-    data.attributes = _uv_maps(mesh, uv_names, loops) + _colors(mesh, data, color_names, loops, group_names)
+    no_maps = {name for name in standard_attributes.shown_by_uv_nodes(uv_names) if name not in mesh.uv_layers}
+    data.attributes = _uv_maps(mesh, uv_names, loops) + _colors(mesh, data, no_maps.union(color_names), loops,
+                                                                group_names)
     data.left_out = [name for name, _ in data.attributes[abi.MAX_ATTRIBUTES:]]
     del data.attributes[abi.MAX_ATTRIBUTES:]
     return data

@@ -24,6 +24,11 @@ def source(name):
     return NOTHING if name in _FOREIGN else _DERIVED.get(name, name)
 
 
+def shown_by_uv_nodes(names):
+    """Those of the names in UV Map nodes that may be of attributes which are no UV maps."""
+    return {name for name in names if name and source(name) == name}
+
+
 def map_of_tangents(mesh, name, kind=TANGENT):
     """The UV map of a mesh whose tangents an attribute of that name is, None for none; kind: or SIGN. From Cycles 5 on
     attributes of Blender go before tangents."""

@@ -11,7 +11,7 @@ from ..compat import PARTICLE_HAIR_HAS_NORMALS, VECTORS_ARE_BUFFERS
 from . import curves
 from .attribute_values import VELOCITY, colors_of, has_velocity, is_pair, linear, named_colors, widen
 from .mesh import active_color_name, wanted_uv_layers
-from .standard_attributes import UV
+from .standard_attributes import UV, shown_by_uv_nodes
 
 HAIR_ATTRIBUTE = ".hair"  # (intercept, length, thickness, random) of the Hair Info node
 DIRECTION_ATTRIBUTE = ".strand"  # (x, y, z) along the strand, unit, and 1
@@ -204,7 +204,7 @@ def _root_values(mesh, modifier, strands, uv_names, color_names):
     for number, layer in wanted_uv_layers(mesh, uv_names):
         values = _at_roots(modifier.particle_system.uv_on_emitter, modifier, strands, uv_no=number)
         found.append((layer.name, values, True))
-    for name in sorted(color_names):
+    for name in sorted(shown_by_uv_nodes(uv_names).union(color_names)):
         values = named_colors(name, color_names, lambda each: _root_colors(mesh, modifier, strands, each),
                               lambda each: _root_layer(mesh, each) is not None)
         if values is not None and all(name != known for known, _, _ in found):
@@ -247,7 +247,7 @@ def _object_values(data, uv_names, color_names):
         data.normals.foreach_get("vector", normals.reshape(-1))
         rows[:, :3] = normals
         found.append((NORMAL_ATTRIBUTE, rows, False))
-    for name in sorted(color_names):
+    for name in sorted(shown_by_uv_nodes(uv_names).union(color_names)):
         values = named_colors(name, color_names, lambda each: _colors(data, each),
                               lambda each: each == UV or is_pair(data.attributes, each))
         if values is not None and all(name != known for known, _, _ in found):
