@@ -123,6 +123,51 @@ static void materials_change(void **state) {
     }
 }
 
+/* Of the roof, transparent to shadow rays or not. */
+static trc_material_desc clear_material(struct node_list *list, bool to_shadows) {
+    trc_material_desc desc = node_material(list, TRC_NODE_TRANSPARENT, 0.5f);
+    desc.flags &= ~(uint32_t)TRC_MATERIAL_TRANSPARENT_SHADOW;
+    desc.flags |= to_shadows ? TRC_MATERIAL_TRANSPARENT_SHADOW : 0;
+    return desc;
+}
+
+/* A mirror over the floor, and above the roof what shines through all, as far as shadows are asked.
+ */
+static struct edited edited_with_link(bool to_shadows) {
+    static const float above[12] = {-9, -9, 5, 9, -9, 5, 9, 9, 5, -9, 9, 5};
+    const struct edited e = edited_make(TRC_NODE_TRANSPARENT, 0.5f, 40);
+    struct node_list list;
+    trc_material_desc desc = clear_material(&list, to_shadows);
+    trc_id lamp = 0, mesh = 0, id = 0;
+    assert_ok(trc_material_update(e.scene, e.roof, &desc));
+    fixture_level(e.scene, 20.0f, 0.1f, fixture_glossy(e.scene, 0.8f, 0.0f));
+    desc = node_material(&list, TRC_NODE_EMISSION, 5.0f);
+    assert_ok(trc_material_create(e.scene, &desc, &lamp));
+    const trc_mesh_desc quad = fixture_quad_desc(above);
+    assert_ok(trc_mesh_create(e.scene, &quad, &mesh));
+    trc_instance_desc instance = default_instance_desc(mesh);
+    instance.materials = &lamp;
+    instance.material_count = 1;
+    instance.shadow_exclude = 1; /* of what has set 0: all */
+    assert_ok(trc_instance_create(e.scene, &instance, &id));
+    return e;
+}
+
+/* What is transparent hides lights with linked shadows from reflections if it is not to shadow
+ * rays. */
+static void what_hides_linked_lights_changes(void **state) {
+    (void)state;
+    static float before[4 * LEVEL_PIXELS];
+    for (int k = 0; k < 2; k++) {
+        const struct edited e = edited_with_link(k == 0), fresh = edited_with_link(k == 1);
+        struct node_list list;
+        draw(e.scene, before);
+        const trc_material_desc desc = clear_material(&list, k == 1);
+        assert_ok(trc_material_update(e.scene, e.roof, &desc));
+        expect_same(&e, &fresh, before);
+    }
+}
+
 /* Trees whose leaves say what is transparent stay while that does, and are refitted. */
 static void trees_of_transparent_meshes_stay(void **state) {
     (void)state;
@@ -229,6 +274,7 @@ static void instances_move(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(materials_change),
+        cmocka_unit_test(what_hides_linked_lights_changes),
         cmocka_unit_test(trees_of_transparent_meshes_stay),
         cmocka_unit_test(images_of_the_world_change),
         cmocka_unit_test(images_get_contents),

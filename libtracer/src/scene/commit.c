@@ -67,13 +67,15 @@ const char *trc_snapshot_warnings(const struct trc_snapshot *snapshot) {
 
 static void destroy_bvh(void *object) { trc_bvh_destroy(object); }
 
-/* What the trees read of materials is the same in both snapshots. */
+/* What the trees read of materials is the same in both snapshots, and what instances in them are
+ * marked by as solid. */
 static bool transparency_is_equal(const struct trc_snapshot *a, const struct trc_snapshot *b) {
     if (a->material_count != b->material_count)
         return false;
     for (uint32_t i = 0; i < a->material_count; i++) {
         const struct trc_material *x = a->materials[i], *y = b->materials[i];
-        if (x != y && trc_material_is_clear(x) != trc_material_is_clear(y))
+        if (x != y && (trc_material_is_clear(x) != trc_material_is_clear(y) ||
+                       trc_material_shadows_transparent(x) != trc_material_shadows_transparent(y)))
             return false;
     }
     return true;
