@@ -52,7 +52,7 @@ static void set_noise(struct square *s, uint32_t pixel, float apart) {
     s->halves[pixel].light[0] = SAMPLES / 2 * (1.0f + apart / 2.0f);
 }
 
-/* The noise that is planned by: apart over three channels of light, and the Gaussian around. */
+/* The noise that is planned by: apart over three channels of light, root mean square around. */
 static double noise_around(const double *apart, uint32_t pixel) {
     const int px = (int)(pixel % SIDE), py = (int)(pixel / SIDE);
     double sum = 0.0, weights = 0.0;
@@ -61,10 +61,10 @@ static double noise_around(const double *apart, uint32_t pixel) {
             if (x < 0 || y < 0 || x >= SIDE || y >= SIDE || (x == px && y == py))
                 continue;
             const double weight = exp(-0.5 * ((x - px) * (x - px) + (y - py) * (y - py)));
-            sum += weight * apart[y * SIDE + x] / 3.03;
+            sum += weight * pow(apart[y * SIDE + x] / 3.03, 2.0);
             weights += weight;
         }
-    return sum / weights;
+    return sqrt(sum / weights);
 }
 
 static uint64_t planned_of(const struct square *s) {

@@ -35,10 +35,10 @@ trc_status trc_extra_create(const trc_render_desc *desc, struct trc_extra *extra
     };
     const size_t count = (size_t)made.width * made.height;
     made.levels = trc_alloc_zeroed(count, sizeof *made.levels);
-    made.noise = trc_alloc(count + made.width, sizeof *made.noise);
+    made.noise_squares = trc_alloc(count + made.width, sizeof *made.noise_squares);
     made.tile_rays = trc_alloc_zeroed(
         (size_t)trc_film_tiles(made.width) * trc_film_tiles(made.height), TRC_EXTRA_TILE_BYTES);
-    if (!made.levels || !made.noise || !made.tile_rays) {
+    if (!made.levels || !made.noise_squares || !made.tile_rays) {
         trc_extra_destroy(&made);
         return trc_fail(TRC_ERROR_OUT_OF_MEMORY, "no memory for extra samples");
     }
@@ -48,15 +48,17 @@ trc_status trc_extra_create(const trc_render_desc *desc, struct trc_extra *extra
 
 void trc_extra_destroy(struct trc_extra *extra) {
     trc_free(extra->levels);
-    trc_free(extra->noise);
+    trc_free(extra->noise_squares);
     trc_free(extra->tile_rays);
     memset(extra, 0, sizeof *extra);
 }
 
 /* ---- noise ---- */
 
-/* How far the means of a pixel's halves lie apart, relative to its light; 0 where it has no two. */
-static float noise_of(const struct trc_extra *extra, const struct trc_film *film, size_t pixel) {
+/* The square of how far the means of a pixel's halves lie apart, relative to its light; 0 where it
+ * has no two. */
+static float noise_square_of(const struct trc_extra *extra, const struct trc_film *film,
+                             size_t pixel) {
     const struct trc_half *half = &film->halves[pixel];
     const uint32_t count = film->sample_counts[pixel];
     if (!half->count || half->count >= count)
@@ -74,14 +76,15 @@ static float noise_of(const struct trc_extra *extra, const struct trc_film *film
         square += apart * apart * shown * shown;
         light += c < 3 ? fabs(sum) / count * shown : 0.0;
     }
-    const float noise = (float)(sqrt(square) / (light + (double)LIGHT_FLOOR));
+    light += (double)LIGHT_FLOOR;
+    const float noise = (float)(square / (light * light));
     return noise < INFINITY ? noise : 0.0f;
 }
 
 static void measure_noise(struct trc_extra *extra, const struct trc_film *film) {
     const size_t count = (size_t)extra->width * extra->height;
     for (size_t i = 0; i < count; i++)
-        extra->noise[i] = noise_of(extra, film, i);
+        extra->noise_squares[i] = noise_square_of(extra, film, i);
 }
 
 /* Adds the rows around y, weighted, into columns; returns the sum of weights. */
@@ -93,7 +96,7 @@ static float add_rows(const struct trc_extra *extra, uint32_t y, float *columns)
         if (at < 0 || at >= extra->height)
             continue;
         const float weight = gaussian[k < 0 ? -k : k];
-        const float *row = extra->noise + (size_t)at * extra->width;
+        const float *row = extra->noise_squares + (size_t)at * extra->width;
         for (uint32_t x = 0; x < extra->width; x++)
             columns[x] += weight * row[x];
         weights += weight;
@@ -101,7 +104,8 @@ static float add_rows(const struct trc_extra *extra, uint32_t y, float *columns)
     return weights;
 }
 
-/* The weighted mean noise of the pixels around x, without its own; row_weights: add_rows'. */
+/* The weighted root mean square of noise of the pixels around x, without its own square;
+ * row_weights: add_rows'. */
 static float noise_around(const struct trc_extra *extra, const float *columns, uint32_t x,
                           float row_weights, float own) {
     float sum = 0.0f, weights = 0.0f;
@@ -114,7 +118,7 @@ static float noise_around(const struct trc_extra *extra, const float *columns, u
         weights += weight;
     }
     const float self = gaussian[0] * gaussian[0], others = weights * row_weights - self;
-    return others > self * 0.01f ? fmaxf(sum - self * own, 0.0f) / others : 0.0f;
+    return others > self * 0.01f ? sqrtf(fmaxf(sum - self * own, 0.0f) / others) : 0.0f;
 }
 
 /* ---- levels ---- */
@@ -161,12 +165,12 @@ static double cost_of(const double *bin_rays, uint32_t first) {
 /* Sorts the pixels into bins, which are kept as levels, and adds up the rays of a sample of each
  * bin's. */
 static void sort_pixels(struct trc_extra *extra, double *bin_rays) {
-    float *columns = extra->noise + (size_t)extra->width * extra->height;
+    float *columns = extra->noise_squares + (size_t)extra->width * extra->height;
     for (uint32_t y = 0; y < extra->height; y++) {
         const float weights = add_rows(extra, y, columns);
         for (uint32_t x = 0; x < extra->width; x++) {
             const size_t i = (size_t)y * extra->width + x;
-            const float noise = noise_around(extra, columns, x, weights, extra->noise[i]);
+            const float noise = noise_around(extra, columns, x, weights, extra->noise_squares[i]);
             const float rays = rays_at(extra, x, y);
             extra->levels[i] = bin_of(noise, rays);
             bin_rays[extra->levels[i]] += (double)rays;

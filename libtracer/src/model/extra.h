@@ -10,9 +10,10 @@
  * so.
  *
  * The deviation is taken from how far the means of two halves of samples lie apart, relative to the
- * pixel's light, and the rays are those of its tile. Unbiased: a pixel's count depends on the
- * deviations of its neighbours, never on its own (model/adaptive.h says why), given that pixels are
- * sampled independently; of its tile's rays its own are a thousandth. */
+ * light, by the root mean square of the pixels around, and the rays are those of its tile.
+ * Unbiased: a pixel's count depends on the deviations of its neighbours, never on its own
+ * (model/adaptive.h says why), given that pixels are sampled independently; of its tile's rays its
+ * own are a thousandth. */
 #ifndef TRACER_MODEL_EXTRA_H
 #define TRACER_MODEL_EXTRA_H
 
@@ -38,7 +39,7 @@ struct trc_extra {
     float share;            /* of all rays, at most */
     float exposure;         /* trc_render_desc.film_exposure */
     uint8_t *levels;        /* width * height: a pixel gets 2^level times its samples; NULL: off */
-    float *noise;           /* width * height, and a row of sums of columns */
+    float *noise_squares;   /* width * height, and a row of sums of columns */
     uint64_t *tile_rays;    /* of the samples before, by tile; each is its tile's thread's */
 };
 
