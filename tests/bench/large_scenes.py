@@ -195,7 +195,8 @@ def prepare_lost_empire(source, _folder):
     sun = bpy.data.lights.new("Sun", "SUN")
     sun.energy, sun.angle = 3.0, math.radians(1.0)
     place(bpy.data.objects.new("Sun", sun), (0.0, 0.0, 90.0), (15.0, 20.0, 0.0))
-    add_area_light("Lamp", (0.0, 0.0, 35.0), (0.0, 0.0, 0.0), 8.0, 8000.0, (1.0, 0.85, 0.6))
+    # Not at a whole height, in the plane of leaves: whether they hide it were left to rounding.
+    add_area_light("Lamp", (0.0, 0.0, 34.5), (0.0, 0.0, 0.0), 8.0, 8000.0, (1.0, 0.85, 0.6))
     add_camera((-20.0, 0.0, 40.0), (10.0, 20.0, 8.0), 20.0)
 
 
