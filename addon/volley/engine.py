@@ -29,7 +29,7 @@ class VolleyRenderEngine(bpy.types.RenderEngine):
     bl_use_shading_nodes_custom = False
     bl_use_eevee_viewport = True  # the Material Preview mode is EEVEE's
     bl_use_spherical_stereo = True
-    bl_use_custom_freestyle = False
+    bl_use_custom_freestyle = True
 
     def __init__(self, *args, **kwargs):
         super().__init__(*args, **kwargs)

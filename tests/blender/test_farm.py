@@ -535,6 +535,30 @@ def test_views_may_have_files_of_their_own(tmp_path):
         'INDIVIDUAL': (0, ["INDIVIDUAL_1_L.png", "INDIVIDUAL_1_R.png"]), 'STEREO_3D': (0, ["STEREO_3D_1.png"])}
 
 
+def inside_lines(folder):
+    """Numbers that differ in a frame of parts with Freestyle from one without, its warnings, and whether it is still
+    on."""
+    import bpy
+    from volley.farm import command
+    _make_scene(f"{folder}/farm.blend")
+    scene = bpy.context.scene
+    scene.volley.samples = 2
+    whole = _whole(scene)
+    scene.render.use_freestyle = scene.view_layers[0].use_freestyle = True
+    parts, summary = f"{folder}/lines", f"{folder}/summary.json"
+    assert command.run(["render", "--parts", parts, "--blocks", "0-1/2", "--summary", summary]) == 0
+    assert command.run(["merge", parts, "--output", f"{parts}_#"]) == 0
+    with open(summary, encoding="utf-8") as file:
+        told = [message for message in json.load(file)["warnings"] if "Freestyle" in message]
+    return _same(f"{parts}_1.exr", whole), told, scene.render.use_freestyle
+
+
+def test_parts_are_those_of_the_picture_below_lines(tmp_path):
+    """Lines are a scene that Blender renders after the picture, with layers of the same names."""
+    assert Blender().run(inside_lines, str(tmp_path)) == (
+        0, ["Parts have no lines of Freestyle, which whole frames have"], True)
+
+
 
 def _command(*arguments, blend=None, is_blenders=False, **options):
     """A Blender that runs the command line; is_blenders: as a command of its own, where it has such."""

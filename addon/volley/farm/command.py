@@ -261,7 +261,11 @@ def _render_parts(options, scene, blocks):
     settings, state = scene.volley, job.job()
     state.parts_folder = os.path.abspath(options.parts)
     kept = settings.sample_offset, settings.sample_subset
+    has_lines = scene.render.use_freestyle
     outputs = []
+    if has_lines:
+        job.add_warning("Parts have no lines of Freestyle, which whole frames have")
+    scene.render.use_freestyle = False  # it would render a scene with parts of the same names
     try:
         for index, (begin, end) in enumerate(blocks):
             state.block = index, len(blocks)
@@ -276,6 +280,7 @@ def _render_parts(options, scene, blocks):
             outputs += paths
     finally:
         settings.sample_offset, settings.sample_subset = kept
+        scene.render.use_freestyle = has_lines
         state.parts_folder = ""
     return outputs
 
