@@ -21,6 +21,11 @@ def keeps_topology(blender_object):
     return not any(modifier.type in _JOINING_MODIFIERS for modifier in blender_object.original.modifiers)
 
 
+def is_filled(blender_object):
+    """Whether Blender fills outlines to make an object's mesh."""
+    return blender_object.original.type in {'CURVE', 'FONT'}
+
+
 def is_posable(blender_object):
     """Whether a mesh object's new shapes differ in places alone, as long as their topology is equal."""
     original = blender_object.original
@@ -52,11 +57,12 @@ class KeyedShapes:
 
 
 class MeshMotion(KeyedShapes):
-    """The shapes of one deforming mesh of Blender's."""
+    """The shapes of one deforming mesh of Blender's. is_filled: of a curve or text, whose flat sides Blender fills with
+    other faces between the same vertices at each time."""
 
-    def __init__(self, mesh, data, key_count):
+    def __init__(self, mesh, data, key_count, is_filled=False):
         super().__init__(data, key_count)
-        self._topology = Topology(mesh)
+        self._topology, self._is_filled = Topology(mesh), is_filled
         self._corners = None
         if data.normal_kind == abi.NormalsLayout.CORNER:
             self._corners = LazyLoops(mesh, len(data.indices)).of_triangles
@@ -68,10 +74,14 @@ class MeshMotion(KeyedShapes):
             return self._set_key(index, mesh)
 
     def _set_key(self, index, mesh):
-        if not self._topology.is_of(mesh):
+        has_other_faces = not self._topology.is_of(mesh)
+        if has_other_faces and not (self._is_filled and self._topology.has_counts_of(mesh)):
             self.drop()
             return False
         self.positions[index] = read_positions(mesh)
+        if has_other_faces and self._data.normals is not None:
+            self.normals[index] = _bent_normals(self._data, self.positions[index])
+            return True
         if self._data.normal_kind == abi.NormalsLayout.CORNER:
             self.normals[index] = corner_normals(mesh)[self._corners]
         elif self._data.normal_kind == abi.NormalsLayout.VERTEX:

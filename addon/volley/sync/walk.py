@@ -349,7 +349,9 @@ class Walk:
             velocities = mesh.colors_of_vertices(shape, attribute_values.VELOCITY, group_names)
             if velocities is not None:
                 return data, self._carried(data, velocities[:, :3])
-        return data, deform.MeshMotion(shape, data, item.motion_keys) if motion.may_deform(blender_object) else None
+        if not motion.may_deform(blender_object):
+            return data, None
+        return data, deform.MeshMotion(shape, data, item.motion_keys, deform.is_filled(blender_object))
 
     def _blurs_shapes(self, item, each):
         """Whether an instance is looked at while the shutter is open, and its shapes count."""
