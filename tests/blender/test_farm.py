@@ -559,7 +559,6 @@ def test_parts_are_those_of_the_picture_below_lines(tmp_path):
         0, ["Parts have no lines of Freestyle, which whole frames have"], True)
 
 
-
 def _command(*arguments, blend=None, is_blenders=False, **options):
     """A Blender that runs the command line; is_blenders: as a command of its own, where it has such."""
     environment = {**os.environ, "BLENDER_USER_SCRIPTS": user_scripts()}
