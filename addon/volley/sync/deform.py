@@ -68,15 +68,14 @@ class MeshMotion(KeyedShapes):
             self._corners = LazyLoops(mesh, len(data.indices)).of_triangles
 
     def set_key(self, index, blender_object):
-        """Take the shape of an evaluated object as that key; False (and no motion) when its topology is
-        another."""
+        """Take the shape of an evaluated object as that key; False when its topology is another: then it has the shape
+        of the middle of the shutter there, as in Cycles."""
         with shown_mesh(blender_object) as mesh:
             return self._set_key(index, mesh)
 
     def _set_key(self, index, mesh):
         has_other_faces = not self._topology.is_of(mesh)
         if has_other_faces and not (self._is_filled and self._topology.has_counts_of(mesh)):
-            self.drop()
             return False
         self.positions[index] = read_positions(mesh)
         if has_other_faces and self._data.normals is not None:

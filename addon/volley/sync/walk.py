@@ -398,4 +398,4 @@ class Walk:
             return
         if not waiting.shapes.set_key(index, waiting.read(each)):
             self._sync.warnings.add(
-                f"Object '{each.object.name}': its topology changes in time, no deformation blur")
+                f"Object '{each.object.name}': its topology changes in time, deformation blur in part at most")
