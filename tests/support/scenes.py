@@ -306,6 +306,8 @@ def each_seed(engine, samples, seeds=SEEDS, cycles=None):
     """Set the scene up for an engine and one seed after the other; of so many samples altogether.
     cycles: {name: value} of settings of Cycles' that are not as set_engine has them."""
     set_engine(engine, samples // len(seeds))
+    # A few seeds tell the noise of a pixel only if it has as many samples with each.
+    bpy.context.scene.volley.extra_samples = 0.0
     if engine == 'CYCLES':
         independent_seeds()
         for name, value in (cycles or {}).items():
