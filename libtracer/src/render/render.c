@@ -506,7 +506,7 @@ static trc_status create(struct trc_snapshot *snapshot, const trc_render_desc *d
 
 trc_status trc_render_state_start(struct trc_snapshot *snapshot, const trc_render_desc *desc,
                                   struct trc_render_state **render_out) {
-    struct trc_render_state *render;
+    struct trc_render_state *render = NULL; /* gcc 14 does not follow create() */
     TRC_TRY(create(trc_snapshot_retain(snapshot), desc,
                    snapshot->features & TRC_FEATURE_SHADOW_CATCHERS, &render));
     render->running_count = 1;
