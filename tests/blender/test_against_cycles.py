@@ -229,39 +229,6 @@ def test_blur(blender):
         _close(ours, theirs, kind)
 
 
-def inside_blurred_text():
-    """Text that leans over, and whether Blender fills it with other faces at other times."""
-    import bpy
-    import scenes
-    scene = scenes.empty(size=(72, 48))
-    scenes.camera()
-    scenes.light_world((0.3, 0.35, 0.4))
-    scenes.light('SUN', rotation=(0.6, 0.3, 0.0), energy=3.0)
-    text = bpy.data.curves.new("Text", 'FONT')
-    text.body, text.size, text.extrude, text.bevel_depth = "Ab", 3.0, 0.1, 0.02
-    text.materials.append(scenes.material("Matt", "ShaderNodeBsdfDiffuse"))
-    shown = scenes.link("Text", text)
-    shown.location, shown.rotation_euler = (-1.8, 0.0, -1.0), (1.3, 0.0, 0.2)
-    corners = []
-    for frame, shear in ((0, -0.8), (4, 0.8)):
-        text.shear = shear
-        text.keyframe_insert("shear", frame=frame)
-        bpy.context.view_layer.update()
-        made = shown.to_mesh()
-        corners.append([loop.vertex_index for loop in made.loops])
-        shown.to_mesh_clear()
-    scene.frame_set(2)
-    scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 1.0
-    return _seeds(LIGHT_SAMPLES), corners[0] != corners[1] or bpy.app.version < (5, 0)
-
-
-def test_blurred_text(blender):
-    """In Blender 5 it was not blurred as soon as its faces were others."""
-    (ours, theirs), has_other_faces = blender.run(inside_blurred_text)
-    assert has_other_faces
-    _close(ours, theirs, "text")
-
-
 # Values ----------------------------------------------------------------------------------------------
 
 def _shown(node_type, output, color=False, **settings):

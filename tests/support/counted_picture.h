@@ -15,6 +15,17 @@ struct picture {
     trc_render_progress progress;
 };
 
+/* For groups of tests of one scene, fixture_scene()'s: state is its handle. */
+static inline int fixture_setup(void **state) {
+    static trc_scene scene;
+    scene = fixture_scene();
+    *state = &scene;
+    return 0;
+}
+static inline int fixture_teardown(void **state) {
+    return trc_scene_destroy(*(const trc_scene *)*state) == TRC_OK ? 0 : 1;
+}
+
 /* A render of WIDTH x HEIGHT with the pass of counts, to be freed. */
 static inline struct picture *picture_draw(trc_scene scene, const trc_render_desc *desc) {
     struct picture *p = malloc(sizeof *p);

@@ -260,16 +260,6 @@ static void mattes_are_of_samples_that_count(void **state) {
     assert_int_equal(trc_scene_destroy(scene), TRC_OK);
 }
 
-static int group_setup(void **state) {
-    static trc_scene scene;
-    scene = fixture_scene();
-    *state = &scene;
-    return 0;
-}
-static int group_teardown(void **state) {
-    return trc_scene_destroy(*(const trc_scene *)*state) == TRC_OK ? 0 : 1;
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(unbiased),
                                        cmocka_unit_test(stages),
@@ -278,5 +268,5 @@ int main(void) {
                                        cmocka_unit_test(counts),
                                        cmocka_unit_test(same_mean),
                                        cmocka_unit_test(mattes_are_of_samples_that_count)};
-    return cmocka_run_group_tests(tests, group_setup, group_teardown);
+    return cmocka_run_group_tests(tests, fixture_setup, fixture_teardown);
 }

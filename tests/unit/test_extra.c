@@ -277,21 +277,11 @@ static void not_read(void **state) {
     }
 }
 
-static int group_setup(void **state) {
-    static trc_scene scene;
-    scene = fixture_scene();
-    *state = &scene;
-    return 0;
-}
-static int group_teardown(void **state) {
-    return trc_scene_destroy(*(const trc_scene *)*state) == TRC_OK ? 0 : 1;
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(plans),         cmocka_unit_test(neighbours),
         cmocka_unit_test(nothing_to_do), cmocka_unit_test(counts),
         cmocka_unit_test(halves),        cmocka_unit_test(same_mean_and_less_error),
         cmocka_unit_test(not_read)};
-    return cmocka_run_group_tests(tests, group_setup, group_teardown);
+    return cmocka_run_group_tests(tests, fixture_setup, fixture_teardown);
 }
